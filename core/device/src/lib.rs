@@ -1,0 +1,2 @@
+//! Placeholder head, replaced before the first commit.
+#![no_std]
