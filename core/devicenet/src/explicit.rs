@@ -1,0 +1,229 @@
+//! Explicit messages: header, services, status codes and object paths (CIP volume 3, chapter 4).
+//!
+//! ```text
+//! request   [frag|XID|MAC] [service]        [class] [instance] [attribute] data…
+//! response  [frag|XID|MAC] [service | 80h]  data…
+//! error     [frag|XID|MAC] [94h]            [general status] [additional code]
+//! ```
+//! Body format 8/8: class and instance are one octet each.
+
+use core::fmt;
+
+use crate::MacId;
+
+/// The first octet of every explicit message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// Bit 7: the second octet is a fragmentation octet.
+    pub fragmented: bool,
+    /// Bit 6: the transaction identifier, echoed in the response.
+    pub transaction: bool,
+    /// Bits 5 … 0: in a request to a Group 2 Only Server the master, echoed in the response.
+    pub mac: MacId,
+}
+
+impl Header {
+    /// Reads the octet; every value is a header.
+    #[must_use]
+    pub const fn from_octet(octet: u8) -> Self {
+        Self {
+            fragmented: octet & 0x80 != 0,
+            transaction: octet & 0x40 != 0,
+            mac: MacId::from_low_bits(octet as u16),
+        }
+    }
+
+    /// The octet on the wire.
+    #[must_use]
+    pub const fn to_octet(self) -> u8 {
+        (self.fragmented as u8) << 7 | (self.transaction as u8) << 6 | self.mac.value()
+    }
+
+    /// The same header with the fragmentation bit as given.
+    #[must_use]
+    pub const fn with_fragmented(self, fragmented: bool) -> Self {
+        Self { fragmented, ..self }
+    }
+}
+
+/// A service code, 00 … 7F in requests. Unknown codes survive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Service(pub u8);
+
+impl Service {
+    /// Get_Attributes_All.
+    pub const GET_ATTRIBUTES_ALL: Self = Self(0x01);
+    /// Reset.
+    pub const RESET: Self = Self(0x05);
+    /// Apply_Attributes.
+    pub const APPLY_ATTRIBUTES: Self = Self(0x0D);
+    /// Get_Attribute_Single.
+    pub const GET_ATTRIBUTE_SINGLE: Self = Self(0x0E);
+    /// Set_Attribute_Single.
+    pub const SET_ATTRIBUTE_SINGLE: Self = Self(0x10);
+    /// The service code of an error response; on the wire 94h.
+    pub const ERROR: Self = Self(0x14);
+    /// Restore.
+    pub const RESTORE: Self = Self(0x15);
+    /// Save.
+    pub const SAVE: Self = Self(0x16);
+    /// Allocate_Master/Slave_Connection_Set, on class 03.
+    pub const ALLOCATE: Self = Self(0x4B);
+    /// Release_Master/Slave_Connection_Set, on class 03.
+    pub const RELEASE: Self = Self(0x4C);
+
+    /// The code with the response bit set.
+    #[must_use]
+    pub const fn response(self) -> u8 {
+        self.0 | 0x80
+    }
+}
+
+/// A general status code, the third octet of an error response. Unknown codes survive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct GeneralStatus(pub u8);
+
+impl GeneralStatus {
+    /// 02: resource unavailable.
+    pub const RESOURCE_UNAVAILABLE: Self = Self(0x02);
+    /// 05: path destination unknown.
+    pub const PATH_UNKNOWN: Self = Self(0x05);
+    /// 08: service not supported.
+    pub const SERVICE_NOT_SUPPORTED: Self = Self(0x08);
+    /// 09: invalid attribute value.
+    pub const INVALID_ATTRIBUTE_VALUE: Self = Self(0x09);
+    /// 0B: already in the requested mode or state.
+    pub const ALREADY_IN_STATE: Self = Self(0x0B);
+    /// 0C: object state conflict.
+    pub const OBJECT_STATE_CONFLICT: Self = Self(0x0C);
+    /// 0E: attribute not settable.
+    pub const ATTRIBUTE_NOT_SETTABLE: Self = Self(0x0E);
+    /// 10: device state conflict.
+    pub const DEVICE_STATE_CONFLICT: Self = Self(0x10);
+    /// 13: not enough data.
+    pub const NOT_ENOUGH_DATA: Self = Self(0x13);
+    /// 14: attribute not supported.
+    pub const ATTRIBUTE_NOT_SUPPORTED: Self = Self(0x14);
+    /// 15: too much data.
+    pub const TOO_MUCH_DATA: Self = Self(0x15);
+    /// 16: object does not exist.
+    pub const OBJECT_DOES_NOT_EXIST: Self = Self(0x16);
+    /// 18: no stored attribute data.
+    pub const NO_STORED_DATA: Self = Self(0x18);
+    /// 19: store operation failure.
+    pub const STORE_FAILED: Self = Self(0x19);
+    /// 20: invalid parameter.
+    pub const INVALID_PARAMETER: Self = Self(0x20);
+
+    /// The standard's words for the code.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::RESOURCE_UNAVAILABLE => "resource unavailable",
+            Self::PATH_UNKNOWN => "path destination unknown",
+            Self::SERVICE_NOT_SUPPORTED => "service not supported",
+            Self::INVALID_ATTRIBUTE_VALUE => "invalid attribute value",
+            Self::ALREADY_IN_STATE => "already in the requested state",
+            Self::OBJECT_STATE_CONFLICT => "object state conflict",
+            Self::ATTRIBUTE_NOT_SETTABLE => "attribute not settable",
+            Self::DEVICE_STATE_CONFLICT => "device state conflict",
+            Self::NOT_ENOUGH_DATA => "not enough data",
+            Self::ATTRIBUTE_NOT_SUPPORTED => "attribute not supported",
+            Self::TOO_MUCH_DATA => "too much data",
+            Self::OBJECT_DOES_NOT_EXIST => "object does not exist",
+            Self::NO_STORED_DATA => "no stored attribute data",
+            Self::STORE_FAILED => "store operation failed",
+            Self::INVALID_PARAMETER => "invalid parameter",
+            _ => "unknown status",
+        }
+    }
+}
+
+/// Why a request is refused: general status and additional code (FF = none).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Error {
+    /// The general status.
+    pub general: GeneralStatus,
+    /// The object-specific additional code; FF where there is none.
+    pub additional: u8,
+}
+
+impl Error {
+    /// A refusal with an additional code of the object.
+    #[must_use]
+    pub const fn with(general: GeneralStatus, additional: u8) -> Self {
+        Self { general, additional }
+    }
+}
+
+impl From<GeneralStatus> for Error {
+    fn from(general: GeneralStatus) -> Self {
+        Self { general, additional: 0xFF }
+    }
+}
+
+impl fmt::Display for Error {
+    /// `0E attribute not settable`, with the additional code where there is one.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:02X} {}", self.general.0, self.general.name())?;
+        if self.additional != 0xFF {
+            write!(f, " (additional code {:02X})", self.additional)?;
+        }
+        Ok(())
+    }
+}
+
+impl core::error::Error for Error {}
+
+/// A class code.
+pub mod class {
+    /// Identity.
+    pub const IDENTITY: u8 = 0x01;
+    /// Message Router.
+    pub const MESSAGE_ROUTER: u8 = 0x02;
+    /// DeviceNet.
+    pub const DEVICENET: u8 = 0x03;
+    /// Assembly.
+    pub const ASSEMBLY: u8 = 0x04;
+    /// Connection.
+    pub const CONNECTION: u8 = 0x05;
+}
+
+/// Names one attribute: class, instance (0 = the class itself), attribute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Path {
+    /// Class code.
+    pub class: u8,
+    /// Instance number; 0 is the class itself.
+    pub instance: u8,
+    /// Attribute number.
+    pub attribute: u8,
+}
+
+impl fmt::Display for Path {
+    /// `2f/1/7`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:02x}/{}/{}", self.class, self.instance, self.attribute)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn every_header_octet_survives_being_read() {
+        for octet in 0..=255 {
+            assert_eq!(Header::from_octet(octet).to_octet(), octet);
+        }
+    }
+
+    #[test]
+    fn a_refusal_reads_as_a_sentence() {
+        let plain = Error::from(GeneralStatus::ATTRIBUTE_NOT_SETTABLE);
+        assert_eq!(plain.to_string(), "0E attribute not settable");
+        let owned = Error::with(GeneralStatus::OBJECT_STATE_CONFLICT, 1);
+        assert_eq!(owned.to_string(), "0C object state conflict (additional code 01)");
+    }
+}

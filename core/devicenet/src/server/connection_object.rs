@@ -1,0 +1,227 @@
+//! The Connection object (class 05): the attributes and services of the connections that exist.
+
+use codewheel_station::{Instant, Reader, Writer};
+
+use super::router::{attribute, put};
+use super::{REQUEST_OCTETS, RESPONSE_OCTETS, Server, expect_length, refuse};
+use crate::application::{Done, Request};
+use crate::connection::{Connection, EXPLICIT, POLL, State};
+use crate::explicit::{Error, GeneralStatus, Service};
+use crate::identifier::{
+    EXPLICIT_REQUEST, EXPLICIT_RESPONSE, POLL_COMMAND, POLL_RESPONSE, group_1, group_2,
+};
+use crate::{Application, Event, ProducedPath};
+
+/// What is fixed about a connection instance.
+struct Fixed {
+    instance_type: u8,
+    transport_class_trigger: u8,
+    produced_id: u16,
+    consumed_id: u16,
+    initial_characteristics: u8,
+    produced_size: u16,
+    consumed_size: u16,
+    /// The values that attribute 12 takes.
+    watchdog_actions: &'static [u8],
+}
+
+impl Server {
+    pub(super) fn connection<A: Application>(
+        &mut self,
+        now: Instant,
+        request: Request<'_>,
+        out: &mut Writer<'_>,
+        app: &mut A,
+    ) -> Result<Done, Error> {
+        let instance = request.instance;
+        let fixed =
+            self.fixed(instance, app).ok_or(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST))?;
+        match request.service {
+            Service::GET_ATTRIBUTE_SINGLE => {
+                let (path, data) = attribute(request)?;
+                expect_length(data, 0)?;
+                self.connection_attribute(instance, &fixed, path.attribute, out)
+            }
+            Service::SET_ATTRIBUTE_SINGLE => {
+                let (path, data) = attribute(request)?;
+                self.set_connection_attribute(now, instance, &fixed, path.attribute, data, out, app)
+            }
+            Service::RESET => {
+                expect_length(request.data, 0)?;
+                let connection = self.connection_mut(instance)?;
+                if connection.state == State::Configuring {
+                    return Err(refuse(GeneralStatus::OBJECT_STATE_CONFLICT));
+                }
+                connection.state = State::Established;
+                connection.arm(now);
+                Ok(Done::Now)
+            }
+            Service::APPLY_ATTRIBUTES => {
+                expect_length(request.data, 0)?;
+                let connection = self.connection_mut(instance)?;
+                if connection.state != State::Configuring {
+                    return Err(refuse(GeneralStatus::OBJECT_STATE_CONFLICT));
+                }
+                connection.establish(now);
+                app.notice(now, Event::Established { instance });
+                put(out.u16_le(fixed.produced_id).and_then(|()| out.u16_le(fixed.consumed_id)))
+            }
+            _ => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
+        }
+    }
+
+    fn fixed<A: Application>(&self, instance: u8, app: &A) -> Option<Fixed> {
+        match instance {
+            EXPLICIT if self.explicit.is_some() => Some(Fixed {
+                instance_type: 0,
+                transport_class_trigger: 0x83,
+                produced_id: group_2(self.mac, EXPLICIT_RESPONSE),
+                consumed_id: group_2(self.mac, EXPLICIT_REQUEST),
+                initial_characteristics: 0x21,
+                produced_size: RESPONSE_OCTETS as u16,
+                consumed_size: REQUEST_OCTETS as u16,
+                watchdog_actions: &[Connection::AUTO_DELETE, Connection::DEFERRED_DELETE],
+            }),
+            POLL => self.poll.as_ref().map(|io| Fixed {
+                instance_type: 1,
+                transport_class_trigger: 0x82,
+                produced_id: group_1(POLL_RESPONSE, self.mac),
+                consumed_id: group_2(self.mac, POLL_COMMAND),
+                initial_characteristics: 0x01,
+                produced_size: app.assembly_size(io.path.assembly).unwrap_or(0) as u16,
+                consumed_size: 0,
+                watchdog_actions: &[
+                    Connection::TRANSITION_TO_TIMED_OUT,
+                    Connection::AUTO_DELETE,
+                    Connection::AUTO_RESET,
+                ],
+            }),
+            _ => None,
+        }
+    }
+
+    fn connection_mut(&mut self, instance: u8) -> Result<&mut Connection, Error> {
+        match instance {
+            EXPLICIT => self.explicit.as_mut(),
+            POLL => self.poll.as_mut().map(|io| &mut io.connection),
+            _ => None,
+        }
+        .ok_or(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST))
+    }
+
+    /// The produced path of an I/O connection; the explicit connection has none.
+    fn produced_path(&self, instance: u8) -> Option<ProducedPath> {
+        match instance {
+            POLL => self.poll.as_ref().map(|io| io.path),
+            _ => None,
+        }
+    }
+
+    fn connection_attribute(
+        &mut self,
+        instance: u8,
+        fixed: &Fixed,
+        attribute: u8,
+        out: &mut Writer<'_>,
+    ) -> Result<Done, Error> {
+        let path = self.produced_path(instance);
+        let connection = self.connection_mut(instance)?;
+        put(match attribute {
+            1 => out.u8(connection.state as u8),
+            2 => out.u8(fixed.instance_type),
+            3 => out.u8(fixed.transport_class_trigger),
+            4 => out.u16_le(fixed.produced_id),
+            5 => out.u16_le(fixed.consumed_id),
+            6 => out.u8(fixed.initial_characteristics),
+            7 => out.u16_le(fixed.produced_size),
+            8 => out.u16_le(fixed.consumed_size),
+            9 => out.u16_le(connection.expected_packet_rate),
+            12 => out.u8(connection.watchdog_action),
+            13 => out.u16_le(path.map_or(0, |path| path.length() as u16)),
+            14 => path.map_or(Ok(()), |path| path.write(out)),
+            15 => out.u16_le(0),
+            16 => Ok(()),
+            17 if instance != EXPLICIT => out.u16_le(connection.production_inhibit),
+            _ => return Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+        })
+    }
+
+    #[allow(clippy::too_many_arguments)] // one request, taken apart
+    fn set_connection_attribute<A: Application>(
+        &mut self,
+        now: Instant,
+        instance: u8,
+        fixed: &Fixed,
+        attribute: u8,
+        data: &[u8],
+        out: &mut Writer<'_>,
+        app: &mut A,
+    ) -> Result<Done, Error> {
+        match attribute {
+            9 => {
+                let rate = timer(data)?;
+                let connection = self.connection_mut(instance)?;
+                let configuring = connection.state == State::Configuring;
+                connection.set_expected_packet_rate(now, rate)?;
+                if configuring {
+                    app.notice(now, Event::Established { instance });
+                }
+                put(out.u16_le(rate))
+            }
+            12 => {
+                expect_length(data, 1)?;
+                let action = data.first().copied().unwrap_or_default();
+                if !fixed.watchdog_actions.contains(&action) {
+                    return Err(refuse(GeneralStatus::INVALID_ATTRIBUTE_VALUE));
+                }
+                self.connection_mut(instance)?.watchdog_action = action;
+                Ok(Done::Now)
+            }
+            14 if instance != EXPLICIT => self.set_produced_path(now, instance, data, app),
+            17 if instance != EXPLICIT => {
+                let connection = self.connection_mut(instance)?;
+                if connection.state != State::Configuring {
+                    return Err(refuse(GeneralStatus::OBJECT_STATE_CONFLICT));
+                }
+                let inhibit = timer(data)?;
+                connection.set_production_inhibit(inhibit)?;
+                put(out.u16_le(inhibit))
+            }
+            1..=8 | 13..=17 => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)),
+            _ => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+        }
+    }
+
+    /// Chooses the assembly an I/O connection produces; kept at once (AMG manual §6).
+    fn set_produced_path<A: Application>(
+        &mut self,
+        now: Instant,
+        instance: u8,
+        data: &[u8],
+        app: &mut A,
+    ) -> Result<Done, Error> {
+        if self.connection_mut(instance)?.state != State::Configuring {
+            return Err(refuse(GeneralStatus::OBJECT_STATE_CONFLICT));
+        }
+        if data.is_empty() {
+            return Err(refuse(GeneralStatus::NOT_ENOUGH_DATA));
+        }
+        let path = ProducedPath::parse(data)
+            .filter(|path| app.assembly_size(path.assembly).is_some())
+            .ok_or(refuse(GeneralStatus::INVALID_ATTRIBUTE_VALUE))?;
+        if let Some(io) = &mut self.poll {
+            io.path = path;
+        }
+        if self.settings.poll_path != path {
+            self.settings.poll_path = path;
+            app.keep(now, self.settings);
+        }
+        Ok(Done::Now)
+    }
+}
+
+/// A timer value: two octets.
+fn timer(data: &[u8]) -> Result<u16, Error> {
+    expect_length(data, 2)?;
+    Reader::new(data).u16_le().map_err(|_| refuse(GeneralStatus::NOT_ENOUGH_DATA))
+}

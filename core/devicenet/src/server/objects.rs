@@ -1,0 +1,173 @@
+//! The Identity (01) and DeviceNet (03) objects, and what the stack's own classes say of
+//! themselves.
+
+use codewheel_station::can::BitRate;
+use codewheel_station::{Instant, Writer};
+
+use super::router::{attribute, put};
+use super::{Restart, Server, expect_length, refuse};
+use crate::application::{Class, Done, Request, Reset};
+use crate::connection::POLL;
+use crate::explicit::{Error, GeneralStatus, Service, class};
+use crate::{Application, Identity};
+
+/// Identity attribute 8: operational.
+const OPERATIONAL: u8 = 3;
+/// Identity attribute 5, bit 0: a master owns the connection set.
+const OWNED: u16 = 1;
+
+impl Server {
+    /// Class attributes of the stack's own classes.
+    pub(super) const fn own_class(class: u8) -> Option<Class> {
+        Some(match class {
+            class::IDENTITY | class::MESSAGE_ROUTER => Class { revision: 1, max_instance: 1 },
+            class::DEVICENET => Class { revision: 2, max_instance: 1 },
+            class::ASSEMBLY => Class { revision: 2, max_instance: 2 },
+            class::CONNECTION => Class { revision: 1, max_instance: POLL as u16 },
+            _ => return None,
+        })
+    }
+
+    pub(super) fn identity<A: Application>(
+        &mut self,
+        now: Instant,
+        request: Request<'_>,
+        out: &mut Writer<'_>,
+        app: &mut A,
+    ) -> Result<Done, Error> {
+        if request.instance != 1 {
+            return Err(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST));
+        }
+        match request.service {
+            Service::GET_ATTRIBUTE_SINGLE => {
+                let (path, data) = attribute(request)?;
+                expect_length(data, 0)?;
+                self.identity_attribute(path.attribute, out, app)
+            }
+            Service::RESET => {
+                let reset = match *request.data {
+                    [] | [0] => Reset::PowerCycle,
+                    [1] => Reset::Defaults,
+                    [_] => return Err(refuse(GeneralStatus::INVALID_PARAMETER)),
+                    _ => return Err(refuse(GeneralStatus::TOO_MUCH_DATA)),
+                };
+                let done = app.reset(now, reset)?;
+                self.restart = Restart::Answering;
+                Ok(done)
+            }
+            _ => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
+        }
+    }
+
+    fn identity_attribute<A: Application>(
+        &self,
+        attribute: u8,
+        out: &mut Writer<'_>,
+        app: &A,
+    ) -> Result<Done, Error> {
+        let Identity {
+            vendor,
+            device_type,
+            product_code,
+            major_revision,
+            minor_revision,
+            serial,
+            product_name,
+        } = app.identity();
+        put(match attribute {
+            1 => out.u16_le(vendor),
+            2 => out.u16_le(device_type),
+            3 => out.u16_le(product_code),
+            4 => out.octets(&[major_revision, minor_revision]),
+            5 => out.u16_le(app.status() | if self.master.is_some() { OWNED } else { 0 }),
+            6 => out.u32_le(serial),
+            7 => {
+                out.u8(product_name.len() as u8).and_then(|()| out.octets(product_name.as_bytes()))
+            }
+            8 => out.u8(OPERATIONAL),
+            9 => out.u16_le(app.configuration_consistency()),
+            _ => return Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+        })
+    }
+
+    pub(super) fn devicenet<A: Application>(
+        &mut self,
+        now: Instant,
+        request: Request<'_>,
+        out: &mut Writer<'_>,
+        app: &mut A,
+    ) -> Result<Done, Error> {
+        if request.instance != 1 {
+            return Err(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST));
+        }
+        match request.service {
+            Service::GET_ATTRIBUTE_SINGLE => {
+                let (path, data) = attribute(request)?;
+                expect_length(data, 0)?;
+                self.devicenet_attribute(path.attribute, out, app)
+            }
+            Service::SET_ATTRIBUTE_SINGLE => {
+                let (path, data) = attribute(request)?;
+                match path.attribute {
+                    3 => {
+                        expect_length(data, 1)?;
+                        let bus_off_interrupt = match *data {
+                            [0] => false,
+                            [1] => true,
+                            _ => return Err(refuse(GeneralStatus::INVALID_ATTRIBUTE_VALUE)),
+                        };
+                        if self.settings.bus_off_interrupt != bus_off_interrupt {
+                            self.settings.bus_off_interrupt = bus_off_interrupt;
+                            app.keep(now, self.settings);
+                        }
+                        Ok(Done::Now)
+                    }
+                    4 => {
+                        expect_length(data, 1)?;
+                        self.bus_off_counter = 0;
+                        Ok(Done::Now)
+                    }
+                    1 | 2 | 5..=9 => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)),
+                    _ => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+                }
+            }
+            Service::ALLOCATE => self.allocate(now, request.data, out, app),
+            Service::RELEASE => {
+                // Over the explicit connection the owner itself speaks.
+                let Some(owner) = self.master else {
+                    return Err(refuse(GeneralStatus::OBJECT_STATE_CONFLICT));
+                };
+                self.release(now, request.data, owner, app)
+            }
+            _ => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
+        }
+    }
+
+    fn devicenet_attribute<A: Application>(
+        &self,
+        attribute: u8,
+        out: &mut Writer<'_>,
+        app: &A,
+    ) -> Result<Done, Error> {
+        let bit_rate = match self.bit_rate {
+            BitRate::Kbit125 => 0,
+            BitRate::Kbit250 => 1,
+            BitRate::Kbit500 => 2,
+        };
+        let switches = app.switches();
+        put(match attribute {
+            1 => out.u8(self.mac.value()),
+            2 => out.u8(bit_rate),
+            3 => out.u8(u8::from(self.settings.bus_off_interrupt)),
+            4 => out.u8(self.bus_off_counter),
+            5 => {
+                out.octets(&[self.allocation_choice(), self.master.map_or(0xFF, |mac| mac.value())])
+            }
+            6 => out.u8(u8::from(switches.mac != self.mac.value())),
+            7 => out.u8(u8::from(switches.bit_rate != bit_rate)),
+            8 => out.u8(switches.mac),
+            9 => out.u8(switches.bit_rate),
+            _ => return Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+        })
+    }
+}

@@ -1,0 +1,168 @@
+//! From the body of an explicit request to its object and back.
+
+use codewheel_station::{Instant, Writer};
+
+use super::{Pending, RESPONSE_OCTETS, Server, expect_length, refuse};
+use crate::application::{Done, Request};
+use crate::explicit::{Error, GeneralStatus, Header, Path, Service, class};
+use crate::{Application, Class};
+
+impl Server {
+    /// Carries out the request in `body` and owes its response.
+    pub(super) fn request<A: Application>(
+        &mut self,
+        now: Instant,
+        header: Header,
+        body: &[u8],
+        app: &mut A,
+    ) {
+        let Some((&service, rest)) = body.split_first() else { return };
+        if service >= 0x80 {
+            // A response is nothing that a server could answer.
+            return;
+        }
+        let service = Service(service);
+        if self.pending.is_some() {
+            let busy = refuse(GeneralStatus::DEVICE_STATE_CONFLICT);
+            return self.respond(header, service, Err(busy));
+        }
+        let &[class, instance, ref data @ ..] = rest else {
+            let short = refuse(GeneralStatus::NOT_ENOUGH_DATA);
+            return self.respond(header, service, Err(short));
+        };
+        let request = Request { service, class, instance, data };
+        let mut octets = [0; RESPONSE_OCTETS - 1];
+        let mut out = Writer::new(&mut octets);
+        let result = self.route(now, request, &mut out, app);
+        let written = out.len();
+        match result {
+            Ok(Done::Later) => self.pending = Some(Pending { header, service, result: None }),
+            Ok(Done::Now) => {
+                for (to, from) in self.response.iter_mut().skip(1).zip(&octets).take(written) {
+                    *to = *from;
+                }
+                self.respond(header, service, Ok(written));
+            }
+            Err(error) => self.respond(header, service, Err(error)),
+        }
+    }
+
+    fn route<A: Application>(
+        &mut self,
+        now: Instant,
+        request: Request<'_>,
+        out: &mut Writer<'_>,
+        app: &mut A,
+    ) -> Result<Done, Error> {
+        let own = Self::own_class(request.class);
+        let about = own
+            .or_else(|| app.class(request.class))
+            .ok_or(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST))?;
+        if request.instance == 0 {
+            return self.class_level(now, request, about, own.is_some(), out, app);
+        }
+        match request.class {
+            class::IDENTITY => self.identity(now, request, out, app),
+            class::MESSAGE_ROUTER => message_router(request),
+            class::DEVICENET => self.devicenet(now, request, out, app),
+            class::ASSEMBLY => assembly(now, request, out, app),
+            class::CONNECTION => self.connection(now, request, out, app),
+            _ => match request.service {
+                Service::GET_ATTRIBUTE_SINGLE => {
+                    let (path, data) = attribute(request)?;
+                    expect_length(data, 0)?;
+                    app.get(now, path, out).map(|()| Done::Now)
+                }
+                Service::SET_ATTRIBUTE_SINGLE => {
+                    let (path, data) = attribute(request)?;
+                    app.set(now, path, data)
+                }
+                _ => app.serve(now, request, out),
+            },
+        }
+    }
+
+    fn class_level<A: Application>(
+        &mut self,
+        now: Instant,
+        request: Request<'_>,
+        about: Class,
+        own: bool,
+        out: &mut Writer<'_>,
+        app: &mut A,
+    ) -> Result<Done, Error> {
+        match request.service {
+            Service::GET_ATTRIBUTE_SINGLE => {
+                let (path, data) = attribute(request)?;
+                expect_length(data, 0)?;
+                match path.attribute {
+                    1 => put(out.u16_le(about.revision)),
+                    2 => put(out.u16_le(about.max_instance)),
+                    _ if own => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+                    _ => app.get(now, path, out).map(|()| Done::Now),
+                }
+            }
+            Service::SET_ATTRIBUTE_SINGLE => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
+            _ if own => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
+            _ => app.serve(now, request, out),
+        }
+    }
+}
+
+/// The Message Router has one instance and no attributes.
+fn message_router(request: Request<'_>) -> Result<Done, Error> {
+    if request.instance != 1 {
+        return Err(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST));
+    }
+    match request.service {
+        Service::GET_ATTRIBUTE_SINGLE => {
+            let (_, data) = attribute(request)?;
+            expect_length(data, 0)?;
+            Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED))
+        }
+        _ => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
+    }
+}
+
+/// Assembly instances: attribute 3 data, 4 size. What the device produces cannot be set.
+fn assembly<A: Application>(
+    now: Instant,
+    request: Request<'_>,
+    out: &mut Writer<'_>,
+    app: &mut A,
+) -> Result<Done, Error> {
+    let size =
+        app.assembly_size(request.instance).ok_or(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST))?;
+    match request.service {
+        Service::GET_ATTRIBUTE_SINGLE => {
+            let (path, data) = attribute(request)?;
+            expect_length(data, 0)?;
+            match path.attribute {
+                3 => {
+                    let mut octets = [0; 8];
+                    let size = app.produce(now, request.instance, &mut octets);
+                    put(out.octets(octets.get(..size).unwrap_or(&octets)))
+                }
+                4 => put(out.u16_le(size as u16)),
+                _ => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+            }
+        }
+        Service::SET_ATTRIBUTE_SINGLE => match attribute(request)?.0.attribute {
+            3 | 4 => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)),
+            _ => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+        },
+        _ => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
+    }
+}
+
+/// The attribute that a Get or Set names, and the data behind it.
+pub(super) fn attribute<'a>(request: Request<'a>) -> Result<(Path, &'a [u8]), Error> {
+    let (&attribute, data) =
+        request.data.split_first().ok_or(refuse(GeneralStatus::NOT_ENOUGH_DATA))?;
+    Ok((Path { class: request.class, instance: request.instance, attribute }, data))
+}
+
+/// Ends a Get: done, or the response buffer was too small for the value.
+pub(super) fn put(result: Result<(), codewheel_station::Full>) -> Result<Done, Error> {
+    result.map(|()| Done::Now).map_err(|_| refuse(GeneralStatus::RESOURCE_UNAVAILABLE))
+}
