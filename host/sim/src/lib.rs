@@ -1,1 +1,16 @@
-//! Placeholder head.
+//! The laboratory in virtual time: a CAN wire with faults, shafts, torn memory.
+//!
+//! Time is a number that whoever runs the laboratory moves forward; nothing here reads a clock,
+//! starts a thread or opens a socket, and every fault is drawn from a seed. So a week on the bus
+//! passes in minutes, and what went wrong once goes wrong again in the same way.
+//!
+//! - [`can::Wire`] joins stations to a CAN segment and steps from event to event.
+//! - [`shaft::Shaft`] turns a line of text into raw codes for an encoder.
+//! - [`memory::TornMemory`] forgets the rest of a write when the power fails.
+//!
+//! # Panics
+//! Nothing a station sends and nothing a user writes makes this crate panic; a panic is a bug.
+
+pub mod can;
+pub mod memory;
+pub mod shaft;

@@ -1,0 +1,20 @@
+//! Faults drawn from a seed.
+
+use fastrand::Rng;
+
+/// How often the wire fails. Probabilities from 0 (never, the default) to 1 (always); what lies
+/// outside counts as the nearer end, what is no number as 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Faults {
+    /// How likely a station that should take a frame does not see it; drawn for each taker. The
+    /// sender still counts the frame as sent.
+    pub loss: f64,
+    /// How likely a frame is destroyed on the wire: nobody takes it, and its sender repeats it.
+    pub corruption: f64,
+}
+
+/// Whether something with this probability happens. Certain outcomes draw nothing, so a wire
+/// without faults runs the same whatever its seed.
+pub(super) fn happens(random: &mut Rng, probability: f64) -> bool {
+    probability >= 1.0 || probability > 0.0 && random.f64() < probability
+}
