@@ -1,0 +1,143 @@
+//! Why a port cannot be opened or is lost.
+
+use std::io;
+use std::net::SocketAddr;
+
+use codewheel_station::can::BitRate;
+use thiserror::Error;
+
+/// Why a port cannot be opened or is lost: what was tried, what came back, what to do.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// The host name leads to no address.
+    #[error("cannot find the host of {endpoint}: {}; check its name", phrase(.reason))]
+    Resolve {
+        /// Host and port as given.
+        endpoint: String,
+        /// What the system said.
+        reason: io::Error,
+    },
+    /// The TCP port cannot be listened on.
+    #[error("cannot listen on {endpoint}: {}{}", phrase(.reason), listen_advice(.reason))]
+    Listen {
+        /// Host and port as given.
+        endpoint: String,
+        /// What the system said.
+        reason: io::Error,
+    },
+    /// The adapter cannot be reached.
+    #[error("cannot connect to {endpoint}: {}{}", phrase(.reason), connect_advice(.reason))]
+    Connect {
+        /// Host and port as given.
+        endpoint: String,
+        /// What the system said.
+        reason: io::Error,
+    },
+    /// The adapter refused to open its channel.
+    #[error(
+        "the adapter at {peer} refused to open its channel (it answered O with BEL): another \
+         program may hold it, or it lacks the bit rate; free the adapter and try again"
+    )]
+    Refused {
+        /// Where the adapter is.
+        peer: SocketAddr,
+    },
+    /// The connection to the adapter is gone.
+    #[error(
+        "the connection to the adapter at {peer} was lost: {reason}; start the adapter and \
+         then this program again"
+    )]
+    Lost {
+        /// Where the adapter was.
+        peer: SocketAddr,
+        /// What the system said, or that the other side closed it.
+        reason: String,
+    },
+    /// The virtual bus runs at another bit rate.
+    #[error(
+        "cannot join virtual:{name} at {asked}: the bus runs at {actual}; \
+         take that rate, or another name"
+    )]
+    OtherBitRate {
+        /// The name of the bus.
+        name: String,
+        /// The rate asked for.
+        asked: BitRate,
+        /// The rate of those who joined before.
+        actual: BitRate,
+    },
+    /// The operating system cannot watch sockets.
+    #[error(
+        "the operating system cannot watch the sockets of the bus: {0}; close other \
+         programs and try again"
+    )]
+    System(io::Error),
+}
+
+/// What went wrong, without the number that the system appends.
+fn phrase(reason: &io::Error) -> String {
+    match reason.kind() {
+        io::ErrorKind::AddrInUse => "address already in use".to_owned(),
+        io::ErrorKind::AddrNotAvailable => "no such address on this machine".to_owned(),
+        io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        io::ErrorKind::ConnectionRefused => "connection refused".to_owned(),
+        io::ErrorKind::TimedOut => "no answer".to_owned(),
+        _ => reason.to_string(),
+    }
+}
+
+fn listen_advice(reason: &io::Error) -> &'static str {
+    match reason.kind() {
+        io::ErrorKind::AddrInUse => "; another program holds the port: choose another or stop it",
+        io::ErrorKind::AddrNotAvailable => "; give an address that this machine has",
+        io::ErrorKind::PermissionDenied => "; choose a port from 1024 on",
+        _ => "; choose another address or port",
+    }
+}
+
+fn connect_advice(reason: &io::Error) -> &'static str {
+    match reason.kind() {
+        io::ErrorKind::ConnectionRefused => "; nothing listens there: start the adapter first",
+        _ => "; check the address, the network and that the adapter is running",
+    }
+}
+
+/// What went wrong with a connection, as part of [`LinkError::Lost`].
+pub(crate) fn lost_phrase(reason: &io::Error) -> String {
+    phrase(reason)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_say_what_was_tried_what_came_back_and_what_to_do() {
+        let endpoint = || "adapter:4001".to_owned();
+        let error = LinkError::Resolve {
+            endpoint: endpoint(),
+            reason: io::Error::new(io::ErrorKind::NotFound, "no such name"),
+        };
+        assert_eq!(
+            error.to_string(),
+            "cannot find the host of adapter:4001: no such name; check its name"
+        );
+        let error =
+            LinkError::Connect { endpoint: endpoint(), reason: io::ErrorKind::TimedOut.into() };
+        assert_eq!(
+            error.to_string(),
+            "cannot connect to adapter:4001: no answer; check the address, the network and that \
+             the adapter is running"
+        );
+        let error = LinkError::Listen {
+            endpoint: endpoint(),
+            reason: io::ErrorKind::AddrNotAvailable.into(),
+        };
+        assert_eq!(
+            error.to_string(),
+            "cannot listen on adapter:4001: no such address on this machine; give an address that \
+             this machine has"
+        );
+    }
+}

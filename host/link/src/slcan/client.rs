@@ -1,0 +1,351 @@
+//! `slcan:HOST:PORT`: we are the client of an adapter, or of another codewheel.
+
+use std::collections::VecDeque;
+use std::io::{self, Read};
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use codewheel_station::can::{BitRate, Frame};
+use mio::net::TcpStream;
+use mio::{Interest, Token};
+
+use super::answer::{Answer, AnswerDecoder};
+use super::line::Line;
+use super::output::Output;
+use super::socket::{Limit, Watch, resolve};
+use crate::error::lost_phrase;
+use crate::{CanPort, Endpoint, LinkError, Notice, Received, Waker};
+
+const ADAPTER: Token = Token(1);
+
+/// How long a connection may take.
+const CONNECT_LIMIT: Duration = Duration::from_secs(5);
+
+/// How long an adapter that answers may take for one answer before it counts as silent.
+const ANSWER_LIMIT: Duration = Duration::from_secs(1);
+
+/// Frames remembered for an adapter that has not answered yet.
+const UNANSWERED: usize = 64;
+
+/// Octets read at once.
+const PIECE: usize = 4096;
+
+/// Connects to `endpoint` and asks the adapter there to open its channel at `rate`.
+pub(crate) fn connect(endpoint: &Endpoint, rate: BitRate) -> Result<ClientPort, LinkError> {
+    let failed = |reason| LinkError::Connect { endpoint: endpoint.to_string(), reason };
+    let stream = first_answering(&resolve(endpoint)?).map_err(failed)?;
+    stream.set_nodelay(true).map_err(failed)?;
+    stream.set_nonblocking(true).map_err(failed)?;
+    let peer = stream.peer_addr().map_err(failed)?;
+    let mut stream = TcpStream::from_std(stream);
+    let watch = Watch::new()?;
+    watch
+        .registry()
+        .register(&mut stream, ADAPTER, Interest::READABLE | Interest::WRITABLE)
+        .map_err(LinkError::System)?;
+    let mut port = ClientPort {
+        endpoint: endpoint.to_string(),
+        peer,
+        watch,
+        stream,
+        is_unread: true,
+        decoder: AnswerDecoder::default(),
+        output: Output::default(),
+        commands: VecDeque::new(),
+        opened: Instant::now(),
+        unanswered: VecDeque::new(),
+        answers: false,
+        refusals_told: 0,
+        was_garbled: false,
+        inbox: VecDeque::new(),
+        end: None,
+    };
+    let bit_rate = match rate {
+        BitRate::Kbit125 => "S4",
+        BitRate::Kbit250 => "S5",
+        BitRate::Kbit500 => "S6",
+    };
+    for command in ["C", bit_rate, "O"] {
+        port.output.push(Line::short(format!("{command}\r").as_bytes()));
+        port.commands.push_back(command);
+    }
+    port.flush();
+    Ok(port)
+}
+
+/// Tries one address after the other; together they have [`CONNECT_LIMIT`].
+fn first_answering(addresses: &[SocketAddr]) -> io::Result<std::net::TcpStream> {
+    let limit = Limit::after(Some(CONNECT_LIMIT));
+    let mut reason = io::Error::from(io::ErrorKind::TimedOut);
+    for address in addresses {
+        let left = limit.remaining().unwrap_or(CONNECT_LIMIT);
+        if left.is_zero() {
+            break;
+        }
+        match std::net::TcpStream::connect_timeout(address, left) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => reason = error,
+        }
+    }
+    Err(reason)
+}
+
+/// A channel of somebody else's adapter.
+///
+/// Adapters answer each frame with `z`, `Z` or a lone CR, or not at all. Which kind this is shows
+/// with the first answer to a frame: before it nothing is confirmed, after it one frame is on its
+/// way at a time, so that the next is built when it can go.
+#[derive(Debug)]
+pub(crate) struct ClientPort {
+    endpoint: String,
+    peer: SocketAddr,
+    watch: Watch,
+    stream: TcpStream,
+    /// The socket may hold more: it tells once, and not again before it was read to its end.
+    is_unread: bool,
+    decoder: AnswerDecoder,
+    output: Output,
+    /// Commands whose answer is still to come, oldest first.
+    commands: VecDeque<&'static str>,
+    opened: Instant,
+    /// Frames whose answer is still to come, oldest first.
+    unanswered: VecDeque<Unanswered>,
+    /// Whether this adapter answers frames, as far as is known.
+    answers: bool,
+    /// Refusals told to people since a frame was last taken: one frame is enough.
+    refusals_told: u8,
+    was_garbled: bool,
+    inbox: VecDeque<Received>,
+    end: Option<End>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Unanswered {
+    frame: Frame,
+    since: Instant,
+    is_second_try: bool,
+}
+
+/// Why there is nothing more to be had from the adapter.
+#[derive(Clone, Debug)]
+enum End {
+    Refused,
+    Lost(String),
+}
+
+impl End {
+    fn error(&self, peer: SocketAddr) -> LinkError {
+        match self {
+            Self::Refused => LinkError::Refused { peer },
+            Self::Lost(reason) => LinkError::Lost { peer, reason: reason.clone() },
+        }
+    }
+}
+
+impl ClientPort {
+    /// Reads one piece and takes in what it says.
+    fn read(&mut self) {
+        let mut buffer = [0; PIECE];
+        match self.stream.read(&mut buffer) {
+            Ok(0) => self.lose("the other side closed it".to_owned()),
+            Ok(count) => {
+                for octet in buffer.get(..count).unwrap_or_default() {
+                    if let Some(answer) = self.decoder.push(*octet) {
+                        self.understand(answer);
+                    }
+                }
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => self.is_unread = false,
+            Err(error) => self.lose(lost_phrase(&error)),
+        }
+    }
+
+    fn understand(&mut self, answer: Answer) {
+        // An adapter that leaves commands unanswered must not have its answers to frames taken
+        // for theirs for ever.
+        if matches!(answer, Answer::Taken) || self.opened.elapsed() > ANSWER_LIMIT {
+            self.commands.clear();
+        }
+        match answer {
+            Answer::Frame(frame) => self.inbox.push_back(Received::Frame(frame)),
+            Answer::Done | Answer::Taken => {
+                if self.commands.pop_front().is_none() {
+                    self.confirm();
+                }
+            }
+            Answer::Refused => match self.commands.pop_front() {
+                // A channel that is closed already cannot be closed.
+                Some("C") => {}
+                Some("O") => self.end = Some(End::Refused),
+                Some(command) => self.tell(Notice::CommandRefused { command: command.to_owned() }),
+                None => self.try_again(),
+            },
+            Answer::About => {}
+            Answer::Garbage => {
+                if !self.was_garbled {
+                    self.was_garbled = true;
+                    self.tell(Notice::AdapterGarbled);
+                }
+            }
+        }
+    }
+
+    /// The oldest unanswered frame is out.
+    fn confirm(&mut self) {
+        let Some(unanswered) = self.unanswered.pop_front() else { return };
+        self.answers = true;
+        self.refusals_told = 0;
+        self.inbox.push_back(Received::Sent(unanswered.frame));
+    }
+
+    /// The oldest unanswered frame was refused.
+    fn try_again(&mut self) {
+        let Some(Unanswered { frame, is_second_try, .. }) = self.unanswered.pop_front() else {
+            return;
+        };
+        self.answers = true;
+        if is_second_try {
+            self.tell_refusal(Notice::FrameGivenUp { frame });
+            self.inbox.push_back(Received::Sent(frame));
+        } else {
+            self.tell_refusal(Notice::FrameRefused { frame });
+            self.put(frame, true);
+        }
+    }
+
+    fn tell_refusal(&mut self, notice: Notice) {
+        if self.refusals_told < 2 {
+            self.refusals_told += 1;
+            self.tell(notice);
+        }
+    }
+
+    fn put(&mut self, frame: Frame, is_second_try: bool) {
+        self.output.push(Line::frame(&frame, None));
+        self.unanswered.push_back(Unanswered { frame, since: Instant::now(), is_second_try });
+    }
+
+    /// When an answer that is owed becomes too late. An adapter that never answered owes none.
+    fn answer_limit(&self) -> Option<Instant> {
+        let oldest = self.unanswered.front().filter(|_| self.answers)?;
+        Some(oldest.since + ANSWER_LIMIT)
+    }
+
+    fn give_up_late_answers(&mut self) {
+        if self.answer_limit().is_some_and(|limit| limit <= Instant::now()) {
+            self.answers = false;
+            self.unanswered.clear();
+            self.tell(Notice::AdapterSilent);
+        }
+    }
+
+    /// Makes room for one more frame among those unanswered.
+    fn forget_the_oldest(&mut self) {
+        self.unanswered.retain(|frame| frame.since.elapsed() < ANSWER_LIMIT);
+        if self.unanswered.len() >= UNANSWERED {
+            self.unanswered.pop_front();
+        }
+    }
+
+    fn flush(&mut self) {
+        if let Err(error) = self.output.flush(&mut self.stream) {
+            self.lose(lost_phrase(&error));
+        }
+    }
+
+    fn lose(&mut self, reason: String) {
+        self.is_unread = false;
+        self.end.get_or_insert(End::Lost(reason));
+    }
+
+    fn tell(&mut self, notice: Notice) {
+        self.inbox.push_back(Received::Notice(notice));
+    }
+}
+
+impl CanPort for ClientPort {
+    fn is_ready(&self) -> bool {
+        let has_room = !self.answers || self.unanswered.is_empty();
+        self.end.is_none() && self.output.is_empty() && has_room
+    }
+
+    fn send(&mut self, frame: &Frame) -> Result<bool, LinkError> {
+        if let Some(end) = &self.end {
+            return Err(end.error(self.peer));
+        }
+        if !self.is_ready() {
+            return Ok(false);
+        }
+        self.forget_the_oldest();
+        self.put(*frame, false);
+        // A connection lost here is reported by `receive`, after what had arrived.
+        self.flush();
+        Ok(true)
+    }
+
+    fn receive(&mut self, wait: Option<Duration>) -> Result<Option<Received>, LinkError> {
+        let limit = Limit::after(wait);
+        let was_ready = self.is_ready();
+        loop {
+            // First, so that a flood does not drown it.
+            if self.watch.take_woken() {
+                return Ok(Some(Received::Woken));
+            }
+            if let Some(received) = self.inbox.pop_front() {
+                return Ok(Some(received));
+            }
+            if let Some(end) = &self.end {
+                return Err(end.error(self.peer));
+            }
+            let answer =
+                self.answer_limit().map(|limit| limit.saturating_duration_since(Instant::now()));
+            let pause = match (limit.remaining(), answer) {
+                _ if self.is_unread => Some(Duration::ZERO),
+                (Some(a), Some(b)) => Some(a.min(b)),
+                (a, b) => a.or(b),
+            };
+            self.watch.wait(pause)?;
+            for change in self.watch.changes() {
+                self.is_unread |= change.readable;
+                if change.writable {
+                    self.output.unblock();
+                }
+            }
+            if self.is_unread {
+                self.read();
+            }
+            self.flush();
+            self.give_up_late_answers();
+            let became_ready = !was_ready && self.is_ready();
+            if self.inbox.is_empty() && self.end.is_none() && (became_ready || limit.is_over()) {
+                return Ok(None);
+            }
+        }
+    }
+
+    fn waker(&self) -> Waker {
+        self.watch.waker()
+    }
+
+    fn confirms(&self) -> bool {
+        self.answers
+    }
+
+    fn local_address(&self) -> Option<SocketAddr> {
+        None
+    }
+
+    fn describe(&self) -> String {
+        format!("slcan:{}", self.endpoint)
+    }
+}
+
+impl Drop for ClientPort {
+    /// Closes the channel, so that an adapter of metal does not go on acknowledging frames that
+    /// nobody reads.
+    fn drop(&mut self) {
+        self.output.push(Line::short(b"C\r"));
+        self.flush();
+    }
+}
