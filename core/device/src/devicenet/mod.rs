@@ -1,0 +1,217 @@
+//! An encoder on DeviceNet: the server of the bus and the encoder, tied by the rows.
+
+mod body;
+pub mod rows;
+
+use codewheel_devicenet::explicit::GeneralStatus;
+use codewheel_devicenet::{MacId, Server};
+use codewheel_encoder::{Encoder, Kept, Sensor, Start};
+use codewheel_station::can::{self, Filter, Frame};
+use codewheel_station::{Instant, Station, earlier};
+
+use self::body::Body;
+use crate::event::Event;
+use crate::keeping::Answer;
+use crate::lamp::Lamp;
+use crate::{Product, Snapshot, Switches};
+
+/// What the factory puts into a device besides its product.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Factory {
+    /// Identity attribute 1. Default 468, Baumer IVO, the one Baumer encoder entry in ODVA's list
+    /// (decision).
+    pub vendor: u16,
+    /// Identity attribute 2. Default 0, generic: the encoder profile 22h would demand class 23h,
+    /// and ours is the manufacturer's 2Fh (decision).
+    pub device_type: u16,
+    /// Identity attribute 6.
+    pub serial: u32,
+}
+
+impl Factory {
+    /// The defaults with a serial number.
+    #[must_use]
+    pub const fn with_serial(serial: u32) -> Self {
+        Self { vendor: 468, device_type: 0, serial }
+    }
+}
+
+/// A DeviceNet encoder with its sensor: firmware, simulated or played on a real bus.
+///
+/// Besides what [`Station`] asks, the host serves the memory: after each call it asks
+/// [`keep`](Self::keep), writes what it gets, and reports with [`kept`](Self::kept); then it asks
+/// [`transmit`](Station::transmit) again.
+#[derive(Clone, Debug)]
+pub struct DeviceNetEncoder<S> {
+    server: Server,
+    body: Body<S>,
+}
+
+impl<S: Sensor> DeviceNetEncoder<S> {
+    /// Switches the device on at `now`, with what its memory holds.
+    ///
+    /// A record of another product, or one this product cannot run with, counts as damaged.
+    #[must_use]
+    pub fn power_up(
+        now: Instant,
+        product: &'static Product,
+        factory: Factory,
+        switches: Switches,
+        memory: &Start,
+        sensor: S,
+    ) -> Self {
+        let body = Body::new(now, product, factory, switches, memory, sensor);
+        let server = body.server();
+        Self { server, body }
+    }
+
+    /// Cycles the power: connections, unsaved settings and alarms are gone, the switches are read
+    /// anew, the duplicate MAC ID check runs again.
+    pub fn power_cycle(&mut self, now: Instant) {
+        self.body.restart(now);
+        self.server = self.body.server();
+    }
+
+    /// The product.
+    #[must_use]
+    pub const fn product(&self) -> &'static Product {
+        self.body.product
+    }
+
+    /// The encoder inside.
+    #[must_use]
+    pub const fn encoder(&self) -> &Encoder {
+        &self.body.encoder
+    }
+
+    /// The server inside.
+    #[must_use]
+    pub const fn server(&self) -> &Server {
+        &self.server
+    }
+
+    /// The sensor. Whoever changes it makes the device look at it at its next
+    /// [`advance`](Station::advance).
+    pub const fn sensor_mut(&mut self) -> &mut S {
+        self.body.next_sample = Some(Instant::ZERO);
+        &mut self.body.sensor
+    }
+
+    /// Where the switches stand.
+    #[must_use]
+    pub const fn switches(&self) -> Switches {
+        self.body.switches
+    }
+
+    /// Turns the switches; they act at the next power-up.
+    pub const fn set_switches(&mut self, switches: Switches) {
+        self.body.switches = switches;
+    }
+
+    /// The address in force; `None` while the switches hold the device off the bus.
+    #[must_use]
+    pub fn mac(&self) -> Option<MacId> {
+        self.body.read_switches.mac()
+    }
+
+    /// The frames this device wants to see.
+    #[must_use]
+    pub const fn filter(&self) -> Filter {
+        self.server.filter()
+    }
+
+    /// The record to write into memory now, if there is one. Until [`kept`](Self::kept) has
+    /// reported its end, there is no other.
+    pub fn keep(&mut self) -> Option<Kept> {
+        let Body { keeping, encoder, product, factory, .. } = &mut self.body;
+        keeping.next(product.fingerprint, factory.serial, encoder)
+    }
+
+    /// Whether [`keep`](Self::keep) has a record.
+    #[must_use]
+    pub const fn keep_due(&self) -> bool {
+        self.body.keeping.is_due()
+    }
+
+    /// The write of the record that [`keep`](Self::keep) gave has ended, well or not.
+    pub fn kept<E>(&mut self, now: Instant, result: Result<(), E>) {
+        match self.body.keeping.kept(result.is_ok()) {
+            Answer::Nobody if result.is_ok() => {}
+            Answer::Saved => {
+                self.body.events.push(now, Event::Saved);
+                self.server.complete(Ok(()));
+            }
+            Answer::Nobody => self.body.events.push(now, Event::KeepFailed),
+            Answer::Failed => {
+                self.body.events.push(now, Event::KeepFailed);
+                self.server.complete(Err(GeneralStatus::STORE_FAILED.into()));
+            }
+        }
+    }
+
+    /// The oldest event that has not been fetched.
+    pub fn take_event(&mut self) -> Option<(Instant, Event)> {
+        self.body.events.take()
+    }
+
+    /// What the device shows of itself at `now`.
+    #[must_use]
+    pub fn snapshot(&self, now: Instant) -> Snapshot {
+        let Body { product, switches, factory, encoder, keeping, powered_at, .. } = &self.body;
+        let since = now.since(*powered_at);
+        let lamp = Lamp::of(self.server.status(), since);
+        Snapshot {
+            product,
+            switches: *switches,
+            serial: factory.serial,
+            position: encoder.position(),
+            code: encoder.code(),
+            velocity: encoder.velocity(now),
+            in_force: encoder.block(),
+            saved: keeping.saved,
+            alarm: encoder.alarm(),
+            warning: encoder.warning(),
+            lamp,
+            colour: lamp.colour(since),
+            master: self.server.master(),
+            explicit: self.server.connection_state(codewheel_devicenet::connection::EXPLICIT),
+            poll: self.server.connection_state(codewheel_devicenet::connection::POLL),
+            memory: keeping.memory,
+            writes: keeping.writes,
+            events_lost: self.body.events.lost(),
+        }
+    }
+
+    /// Restarts the device where a reset was answered.
+    fn restart_if_due(&mut self, now: Instant) {
+        if self.server.power_cycle_due() {
+            self.power_cycle(now);
+        }
+    }
+}
+
+impl<S: Sensor> Station for DeviceNetEncoder<S> {
+    type Input<'a> = can::Input<'a>;
+    type Output = Frame;
+
+    fn handle(&mut self, now: Instant, input: can::Input<'_>) {
+        self.server.handle(now, input, &mut self.body);
+        self.restart_if_due(now);
+    }
+
+    fn advance(&mut self, now: Instant) {
+        if self.body.advance(now) {
+            self.server.complete(Err(GeneralStatus::STORE_FAILED.into()));
+        }
+        self.server.advance(now, &mut self.body);
+        self.restart_if_due(now);
+    }
+
+    fn transmit(&mut self, now: Instant) -> Option<Frame> {
+        self.server.transmit(now, &mut self.body)
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        earlier(self.server.deadline(), self.body.deadline())
+    }
+}
