@@ -50,6 +50,24 @@ pub enum Event {
     RecordDamaged,
 }
 
+impl Event {
+    /// Whether something went wrong that a person should look at.
+    #[must_use]
+    pub const fn is_trouble(&self) -> bool {
+        matches!(
+            self,
+            Self::Network(codewheel_devicenet::Event::Faulted(_))
+                | Self::IllegalAddress { .. }
+                | Self::PositionError
+                | Self::CellLow
+                | Self::KeepFailed
+                | Self::MemoryDamaged
+                | Self::FirstWriteInterrupted
+                | Self::RecordDamaged
+        )
+    }
+}
+
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

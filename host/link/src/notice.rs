@@ -84,6 +84,19 @@ pub enum Notice {
     AdapterGarbled,
 }
 
+impl Notice {
+    /// Whether something went wrong, rather than a client coming or going.
+    #[must_use]
+    pub const fn is_trouble(&self) -> bool {
+        !matches!(
+            self,
+            Self::ClientConnected { .. }
+                | Self::ClientOpened { .. }
+                | Self::ClientLeft { frames_lost: 0, .. }
+        )
+    }
+}
+
 impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
