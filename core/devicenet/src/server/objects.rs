@@ -44,6 +44,10 @@ impl Server {
                 expect_length(data, 0)?;
                 self.identity_attribute(path.attribute, out, app)
             }
+            Service::SET_ATTRIBUTE_SINGLE => match attribute(request)?.0.attribute {
+                1..=9 => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)),
+                _ => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+            },
             Service::RESET => {
                 let reset = match *request.data {
                     [] | [0] => Reset::PowerCycle,

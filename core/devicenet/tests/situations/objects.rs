@@ -23,6 +23,10 @@ fn the_identity_reads_as_the_device_says() {
     }
     for absent in ["00", "0B", "64"] {
         bench.asks(&format!("0E 01 01 {absent}"), "94 14 FF");
+        bench.asks(&format!("10 01 01 {absent} 00"), "94 14 FF");
+    }
+    for read_only in 1..=9 {
+        bench.asks(&format!("10 01 01 {read_only:02X} 00"), "94 0E FF");
     }
 }
 
