@@ -1,2 +1,33 @@
-//! Placeholder.
-fn main() {}
+//! `codewheel`: an absolute rotary encoder made of software.
+
+mod arguments;
+mod demo;
+mod describe;
+mod encoder;
+mod failure;
+mod models;
+mod signals;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::arguments::{Arguments, Verb};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let chatter = arguments.chatter();
+    let result = match arguments.verb {
+        None => demo::run(chatter),
+        Some(Verb::Encoder(encoder)) => encoder::run(encoder, chatter),
+        Some(Verb::Models(models)) => models::run(&models),
+        Some(Verb::Describe(describe)) => describe::run(&describe),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("codewheel: {failure}");
+            failure.exit_code()
+        }
+    }
+}

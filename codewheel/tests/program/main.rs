@@ -1,0 +1,6 @@
+//! The program as its users meet it at the prompt.
+
+mod demo;
+mod encoder;
+mod prompt;
+mod refusals;
