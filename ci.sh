@@ -1,0 +1,154 @@
+#!/usr/bin/env bash
+# The checks that people and CI both run.
+#
+#   ./ci.sh              all of them
+#   ./ci.sh fmt test     some
+#   ./ci.sh --list       what there is
+#
+# Each step installs what it needs and is missing (as root, or with sudo). A step that cannot run
+# has failed.
+set -euo pipefail
+cd "$(dirname "$0")"
+export PATH="$PATH:$HOME/.cargo/bin"
+
+CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+export CARGO_TARGET_DIR
+steps=(fmt clippy doc test no-std bench-builds deny strangers)
+
+explain() {
+    case $1 in
+    fmt) echo "the sources are formatted (cargo fmt)" ;;
+    clippy) echo "clippy has nothing to say" ;;
+    doc) echo "the API documentation builds without a warning" ;;
+    test) echo "all tests, walls.rs with the import table among them" ;;
+    no-std) echo "core links without allocator and std, on the host and for Cortex-M0 (proofs/no-std)" ;;
+    bench-builds) echo "the benchmarks build" ;;
+    deny) echo "licences, sources and bans of every dependency (cargo deny, deny.toml)" ;;
+    strangers) echo "python-can plays the DeviceNet master, tshark judges what it saw (strangers/)" ;;
+    esac
+}
+
+step_fmt() {
+    cargo fmt --all --check
+    cargo fmt --manifest-path proofs/no-std/Cargo.toml --check
+}
+
+step_clippy() {
+    cargo clippy --workspace --all-targets --locked -- -D warnings
+}
+
+step_doc() {
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+}
+
+step_test() {
+    cargo test --workspace --locked
+}
+
+step_no-std() {
+    proofs/no-std/check.sh
+}
+
+step_bench-builds() {
+    cargo bench --workspace --no-run --locked
+}
+
+step_deny() {
+    # Without optimization it builds in half the time and checks no slower than one can see.
+    command -v cargo-deny >/dev/null ||
+        env -u CARGO_TARGET_DIR \
+            cargo install cargo-deny --version '^0.20' --locked --debug --quiet
+    cargo deny --locked --workspace check licenses bans sources
+}
+
+step_strangers() {
+    need tshark tshark
+    need python3 python3 python3-venv
+    local venv="$CARGO_TARGET_DIR/strangers-venv"
+    if ! cmp -s strangers/requirements.txt "$venv/requirements.txt"; then
+        rm -rf "$venv"
+        python3 -m venv "$venv" || { install_packages python3-venv && python3 -m venv "$venv"; }
+        "$venv/bin/pip" install --quiet --requirement strangers/requirements.txt
+        cp strangers/requirements.txt "$venv/requirements.txt"
+    fi
+    cargo build --package codewheel --locked
+    "$venv/bin/python" strangers/devicenet_master_test.py
+    "$venv/bin/python" strangers/tshark_judges.py --self-test
+    "$venv/bin/python" strangers/devicenet_session.py "$CARGO_TARGET_DIR/debug/codewheel" \
+        --log "$CARGO_TARGET_DIR/strangers-session.log"
+    "$venv/bin/python" strangers/tshark_judges.py "$CARGO_TARGET_DIR/strangers-session.log"
+}
+
+# Installs Debian packages $2… (or $1) where the command $1 is missing.
+need() {
+    local command=$1
+    shift
+    command -v "$command" >/dev/null || install_packages "$@"
+}
+
+install_packages() {
+    local root=()
+    [ "$(id -u)" = 0 ] || root=(sudo)
+    "${root[@]}" apt-get update -qq
+    "${root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+table=()
+
+run() {
+    local step=$1 begin=$SECONDS took
+    echo "==> $step: $(explain "$step")"
+    # In a process of its own: `set -e` does not work inside a condition.
+    if bash ci.sh --only "$step" </dev/null; then
+        took=$((SECONDS - begin))
+        table+=("$(printf '%-14s ok     %4d s' "$step" "$took")")
+        echo "==> $step: ok, $took s"
+    else
+        took=$((SECONDS - begin))
+        table+=("$(printf '%-14s FAILED %4d s' "$step" "$took")")
+        echo "==> $step: FAILED after $took s; its last lines above say why" >&2
+        echo "    again: ./ci.sh $step" >&2
+        report
+        exit 1
+    fi
+}
+
+report() {
+    echo
+    printf '%s\n' "${table[@]}"
+    printf '%-14s        %4d s\n' together "$SECONDS"
+}
+
+is_step() {
+    local step
+    for step in "${steps[@]}"; do
+        [ "$step" = "$1" ] && return
+    done
+    echo "ci.sh: unknown step '$1'; ./ci.sh --list shows them" >&2
+    exit 2
+}
+
+main() {
+    case ${1-} in
+    --only) "step_$2" ;;
+    --list)
+        for step in "${steps[@]}"; do
+            printf '%-14s %s\n' "$step" "$(explain "$step")"
+        done
+        ;;
+    *)
+        [ $# -gt 0 ] || set -- "${steps[@]}"
+        for step in "$@"; do
+            is_step "$step"
+        done
+        for step in "$@"; do
+            run "$step"
+        done
+        report
+        ;;
+    esac
+}
+
+# Read to the end before anything runs, so that editing this file does not disturb a run.
+main "$@"; exit
