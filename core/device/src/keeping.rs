@@ -5,7 +5,7 @@
 
 use codewheel_devicenet::{NetworkSettings, ProducedPath};
 use codewheel_encoder::{Block, Encoder, Kept, Reference};
-use codewheel_station::{Duration, Instant};
+use codewheel_station::{Deadline, Duration, Instant};
 
 /// How long a Save waits for the memory.
 pub(crate) const KEEP_TIME: Duration = Duration::from_secs(5);
@@ -63,7 +63,7 @@ pub(crate) struct Keeping {
     due: bool,
     writing: Option<Writing>,
     /// When an unanswered Save is given up.
-    answer_by: Option<Instant>,
+    answer_by: Deadline,
 }
 
 /// What the end of a write means for the one who waits for it.
@@ -90,7 +90,7 @@ impl Keeping {
             wanted: Wanted::Nothing,
             due: false,
             writing: None,
-            answer_by: None,
+            answer_by: Deadline::NEVER,
         }
     }
 
@@ -109,7 +109,7 @@ impl Keeping {
     pub(crate) fn save(&mut self, now: Instant, wanted: Wanted) {
         self.wanted = wanted;
         self.due = true;
-        self.answer_by = Some(now + KEEP_TIME);
+        self.answer_by = Deadline::at(now + KEEP_TIME);
     }
 
     /// Whether a record is on its way into memory.
@@ -162,23 +162,24 @@ impl Keeping {
                 self.memory = MemoryState::Good;
             }
         }
-        if !writing.is_save || self.answer_by.take().is_none() {
+        if !writing.is_save || self.answer_by == Deadline::NEVER {
             return Answer::Nobody;
         }
+        self.answer_by = Deadline::NEVER;
         if good { Answer::Saved } else { Answer::Failed }
     }
 
     /// Whether a Save has waited for too long; then it is to be answered as failed, and is off
     /// where its record has not even been fetched.
     pub(crate) fn overdue(&mut self, now: Instant) -> bool {
-        let overdue = self.answer_by.take_if(|at| now >= *at).is_some();
+        let overdue = self.answer_by.take_due(now);
         if overdue {
             self.wanted = Wanted::Nothing;
         }
         overdue
     }
 
-    pub(crate) const fn deadline(&self) -> Option<Instant> {
+    pub(crate) const fn deadline(&self) -> Deadline {
         self.answer_by
     }
 }

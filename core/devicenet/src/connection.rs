@@ -1,6 +1,6 @@
 //! Connection objects (class 05): state, expected packet rate, watchdog, produced path.
 
-use codewheel_station::{Duration, Full, Instant, Writer};
+use codewheel_station::{Deadline, Duration, Full, Instant, Writer};
 
 use crate::explicit::{Error, GeneralStatus, class};
 
@@ -46,7 +46,7 @@ pub struct Connection {
     /// Attribute 17, production inhibit time in ms; 0 = none.
     pub production_inhibit: u16,
     /// When the connection times out unless something arrives.
-    inactive_at: Option<Instant>,
+    inactive_at: Deadline,
 }
 
 impl Connection {
@@ -67,7 +67,7 @@ impl Connection {
             expected_packet_rate: 2500,
             watchdog_action: Self::AUTO_DELETE,
             production_inhibit: 0,
-            inactive_at: None,
+            inactive_at: Deadline::NEVER,
         };
         connection.arm(now);
         connection
@@ -81,7 +81,7 @@ impl Connection {
             expected_packet_rate: 0,
             watchdog_action: Self::TRANSITION_TO_TIMED_OUT,
             production_inhibit: 0,
-            inactive_at: None,
+            inactive_at: Deadline::NEVER,
         }
     }
 
@@ -93,30 +93,31 @@ impl Connection {
 
     /// Something arrived on the connection: the inactivity timer begins anew.
     pub fn arm(&mut self, now: Instant) {
-        self.inactive_at = inactivity_time(self.expected_packet_rate).map(|time| now + time);
+        self.inactive_at = inactivity_time(self.expected_packet_rate)
+            .map_or(Deadline::NEVER, |time| Deadline::at(now + time));
     }
 
     /// From configuring to established; the first interval is the pre-consumption time.
     pub fn establish(&mut self, now: Instant) {
         self.state = State::Established;
         self.inactive_at = inactivity_time(self.expected_packet_rate)
-            .map(|time| now + time.max(PRE_CONSUMPTION_TIME));
+            .map_or(Deadline::NEVER, |time| Deadline::at(now + time.max(PRE_CONSUMPTION_TIME)));
     }
 
     /// Stops the inactivity timer.
     pub const fn disarm(&mut self) {
-        self.inactive_at = None;
+        self.inactive_at = Deadline::NEVER;
     }
 
     /// Whether the peer has been silent for too long.
     #[must_use]
-    pub fn is_inactive(&self, now: Instant) -> bool {
-        self.inactive_at.is_some_and(|at| now >= at)
+    pub const fn is_inactive(&self, now: Instant) -> bool {
+        self.inactive_at.is_due(now)
     }
 
     /// When [`is_inactive`](Self::is_inactive) becomes true.
     #[must_use]
-    pub const fn deadline(&self) -> Option<Instant> {
+    pub const fn deadline(&self) -> Deadline {
         self.inactive_at
     }
 
@@ -217,12 +218,12 @@ mod tests {
     fn the_first_inactivity_time_is_ten_seconds_or_four_times_the_rate() {
         let mut connection = Connection::io();
         connection.set_expected_packet_rate(START, 100).unwrap();
-        assert_eq!(connection.deadline(), Some(START + Duration::from_secs(10)));
+        assert_eq!(connection.deadline(), Deadline::at(START + Duration::from_secs(10)));
         connection.arm(START);
-        assert_eq!(connection.deadline(), Some(START + Duration::from_millis(400)));
+        assert_eq!(connection.deadline(), Deadline::at(START + Duration::from_millis(400)));
         let mut slow = Connection::io();
         slow.set_expected_packet_rate(START, 65535).unwrap();
-        assert_eq!(slow.deadline(), Some(START + Duration::from_millis(4 * 65535)));
+        assert_eq!(slow.deadline(), Deadline::at(START + Duration::from_millis(4 * 65535)));
     }
 
     #[test]
@@ -230,7 +231,7 @@ mod tests {
         let mut connection = Connection::io();
         connection.set_expected_packet_rate(START, 0).unwrap();
         assert!(connection.is_established());
-        assert_eq!(connection.deadline(), None);
+        assert_eq!(connection.deadline(), Deadline::NEVER);
     }
 
     #[test]

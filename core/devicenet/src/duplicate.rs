@@ -4,7 +4,7 @@
 //! `[bit 7 response | physical port 0] [vendor u16] [serial number u32]`.
 
 use codewheel_station::can::Frame;
-use codewheel_station::{Duration, Instant, Reader, Short, Writer};
+use codewheel_station::{Deadline, Duration, Instant, Reader, Short, Writer};
 
 use crate::MacId;
 use crate::identifier::{DUPLICATE_MAC_CHECK, group_2};
@@ -76,7 +76,6 @@ enum Phase {
     /// The request was acknowledged on the wire; another owner would answer until then.
     Listening {
         second: bool,
-        until: Instant,
     },
     OnLine,
     Faulted(Fault),
@@ -97,19 +96,27 @@ pub struct DuplicateMacCheck {
     mac: MacId,
     phase: Phase,
     answer_owed: bool,
+    /// The end of [`Phase::Listening`].
+    listens_until: Deadline,
 }
 
 impl DuplicateMacCheck {
     /// Begins the check for `mac`.
     #[must_use]
     pub const fn begin(mac: MacId) -> Self {
-        Self { mac, phase: Phase::Asking { second: false, handed: false }, answer_owed: false }
+        Self {
+            mac,
+            phase: Phase::Asking { second: false, handed: false },
+            answer_owed: false,
+            listens_until: Deadline::NEVER,
+        }
     }
 
     /// Falls silent for good.
     pub const fn fault(&mut self, fault: Fault) {
         self.phase = Phase::Faulted(fault);
         self.answer_owed = false;
+        self.listens_until = Deadline::NEVER;
     }
 
     /// Whether the check has been passed.
@@ -152,23 +159,23 @@ impl DuplicateMacCheck {
             return;
         }
         if let Phase::Asking { second, handed: true } = self.phase {
-            self.phase = Phase::Listening { second, until: now + LISTEN_TIME };
+            self.phase = Phase::Listening { second };
+            self.listens_until = Deadline::at(now + LISTEN_TIME);
         }
     }
 
     /// Ends a silence that fell due.
     pub fn advance(&mut self, now: Instant) -> Option<Change> {
-        match self.phase {
-            Phase::Listening { second, until } if now >= until => {
-                if second {
-                    self.phase = Phase::OnLine;
-                    return Some(Change::OnLine);
-                }
-                self.phase = Phase::Asking { second: true, handed: false };
-                None
-            }
-            _ => None,
+        if !self.listens_until.is_due(now) {
+            return None;
         }
+        self.listens_until = Deadline::NEVER;
+        if self.phase == (Phase::Listening { second: true }) {
+            self.phase = Phase::OnLine;
+            return Some(Change::OnLine);
+        }
+        self.phase = Phase::Asking { second: true, handed: false };
+        None
     }
 
     /// The check message to send next, signed with `vendor` and `serial`.
@@ -189,10 +196,7 @@ impl DuplicateMacCheck {
 
     /// When [`advance`](Self::advance) must run.
     #[must_use]
-    pub const fn deadline(&self) -> Option<Instant> {
-        match self.phase {
-            Phase::Listening { until, .. } => Some(until),
-            _ => None,
-        }
+    pub const fn deadline(&self) -> Deadline {
+        self.listens_until
     }
 }

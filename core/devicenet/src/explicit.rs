@@ -11,38 +11,43 @@ use core::fmt;
 
 use crate::MacId;
 
-/// The first octet of every explicit message.
+/// The first octet of every explicit message, as on the wire; every value is a header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Header {
-    /// Bit 7: the second octet is a fragmentation octet.
-    pub fragmented: bool,
-    /// Bit 6: the transaction identifier, echoed in the response.
-    pub transaction: bool,
-    /// Bits 5 … 0: in a request to a Group 2 Only Server the master, echoed in the response.
-    pub mac: MacId,
-}
+pub struct Header(pub u8);
 
 impl Header {
-    /// Reads the octet; every value is a header.
+    const FRAGMENTED: u8 = 1 << 7;
+    const TRANSACTION: u8 = 1 << 6;
+
+    /// Bit 7: the second octet is a fragmentation octet.
     #[must_use]
-    pub const fn from_octet(octet: u8) -> Self {
-        Self {
-            fragmented: octet & 0x80 != 0,
-            transaction: octet & 0x40 != 0,
-            mac: MacId::from_low_bits(octet as u16),
-        }
+    pub const fn fragmented(self) -> bool {
+        self.0 & Self::FRAGMENTED != 0
     }
 
-    /// The octet on the wire.
+    /// Bit 6: the transaction identifier, echoed in the response.
     #[must_use]
-    pub const fn to_octet(self) -> u8 {
-        (self.fragmented as u8) << 7 | (self.transaction as u8) << 6 | self.mac.value()
+    pub const fn transaction(self) -> bool {
+        self.0 & Self::TRANSACTION != 0
+    }
+
+    /// Bits 5 … 0: in a request to a Group 2 Only Server the master, echoed in the response.
+    #[must_use]
+    pub const fn mac(self) -> MacId {
+        MacId::from_low_bits(self.0 as u16)
     }
 
     /// The same header with the fragmentation bit as given.
     #[must_use]
     pub const fn with_fragmented(self, fragmented: bool) -> Self {
-        Self { fragmented, ..self }
+        let rest = self.0 & !Self::FRAGMENTED;
+        Self(if fragmented { rest | Self::FRAGMENTED } else { rest })
+    }
+
+    /// The same header with the other transaction identifier, for the next request.
+    #[must_use]
+    pub const fn of_next_transaction(self) -> Self {
+        Self(self.0 ^ Self::TRANSACTION)
     }
 }
 
@@ -213,10 +218,13 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn every_header_octet_survives_being_read() {
-        for octet in 0..=255 {
-            assert_eq!(Header::from_octet(octet).to_octet(), octet);
-        }
+    fn a_header_is_two_bits_and_a_mac_id() {
+        let header = Header(0xCA);
+        assert!(header.fragmented() && header.transaction());
+        assert_eq!(header.mac(), MacId::new(10).unwrap());
+        assert_eq!(header.with_fragmented(true), header);
+        assert_eq!(header.with_fragmented(false), Header(0x4A));
+        assert_eq!(header.of_next_transaction(), Header(0x8A));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! acknowledged by `[header][C0 | count][status]`. I/O messages go unacknowledged:
 //! `[type<<6 | count]` + ≤ 7 octets.
 
-use codewheel_station::{Duration, Instant};
+use codewheel_station::{Deadline, Duration, Instant};
 
 /// How long a sender waits for the acknowledge of a fragment before its one retry.
 pub const ACKNOWLEDGE_TIME: Duration = Duration::from_secs(1);
@@ -87,7 +87,7 @@ pub enum Received {
 #[derive(Clone, Debug)]
 pub struct Reassembly<const N: usize> {
     octets: [u8; N],
-    length: usize,
+    length: u16,
     state: State,
 }
 
@@ -113,6 +113,7 @@ impl<const N: usize> Reassembly<N> {
     /// An empty buffer.
     #[must_use]
     pub const fn new() -> Self {
+        const { assert!(N <= u16::MAX as usize, "lengths are kept in 16 bits") };
         Self { octets: [0; N], length: 0, state: State::Empty }
     }
 
@@ -125,7 +126,7 @@ impl<const N: usize> Reassembly<N> {
     /// The octets of the last complete message.
     #[must_use]
     pub fn body(&self) -> &[u8] {
-        self.octets.get(..self.length).unwrap_or_default()
+        self.octets.get(..usize::from(self.length)).unwrap_or_default()
     }
 
     /// Takes one fragment in. Acknowledges are not for the receiver and are dropped.
@@ -176,10 +177,11 @@ impl<const N: usize> Reassembly<N> {
     }
 
     fn append(&mut self, octets: &[u8]) -> bool {
-        let end = self.length + octets.len();
-        let Some(room) = self.octets.get_mut(self.length..end) else { return false };
+        let begin = usize::from(self.length);
+        let end = begin + octets.len();
+        let Some(room) = self.octets.get_mut(begin..end) else { return false };
         room.copy_from_slice(octets);
-        self.length = end;
+        self.length = end as u16;
         true
     }
 }
@@ -190,9 +192,12 @@ impl<const N: usize> Reassembly<N> {
 /// [`advance`](Sending::advance) at [`deadline`](Sending::deadline).
 #[derive(Clone, Debug)]
 pub struct Sending {
+    length: u16,
     offset: u16,
     count: u8,
     phase: Phase,
+    /// The end of [`Phase::Waiting`].
+    waits_until: Deadline,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -206,7 +211,6 @@ enum Phase {
     },
     /// The fragment at `offset` was handed out and waits for its acknowledge.
     Waiting {
-        until: Instant,
         retried: bool,
     },
 }
@@ -222,19 +226,19 @@ pub enum Piece<'a> {
 
 impl Sending {
     /// Nothing to send.
-    pub const IDLE: Self = Self { offset: 0, count: 0, phase: Phase::Idle };
+    pub const IDLE: Self =
+        Self { length: 0, offset: 0, count: 0, phase: Phase::Idle, waits_until: Deadline::NEVER };
 
     /// Begins to send a body of `length` octets; whatever was on its way is given up.
-    pub const fn begin(&mut self, length: usize) {
-        self.offset = 0;
-        self.count = 0;
-        self.phase =
-            if length <= WHOLE_OCTETS { Phase::Whole } else { Phase::Owed { retried: false } };
+    pub const fn begin(&mut self, length: u16) {
+        let whole = length as usize <= WHOLE_OCTETS;
+        let phase = if whole { Phase::Whole } else { Phase::Owed { retried: false } };
+        *self = Self { length, phase, ..Self::IDLE };
     }
 
     /// Gives up what is on its way.
     pub const fn stop(&mut self) {
-        self.phase = Phase::Idle;
+        *self = Self::IDLE;
     }
 
     /// Whether nothing is left to send or to be acknowledged.
@@ -249,9 +253,10 @@ impl Sending {
         matches!(self.phase, Phase::Whole | Phase::Owed { .. })
     }
 
-    /// The next piece of `body`, the same one that [`begin`](Sending::begin) was told the length
-    /// of.
-    pub fn next<'a>(&mut self, now: Instant, body: &'a [u8]) -> Option<Piece<'a>> {
+    /// The next piece of the body at the beginning of `buffer`, the same one that
+    /// [`begin`](Sending::begin) was told the length of.
+    pub fn next<'a>(&mut self, now: Instant, buffer: &'a [u8]) -> Option<Piece<'a>> {
+        let body = buffer.get(..usize::from(self.length)).unwrap_or(buffer);
         match self.phase {
             Phase::Idle | Phase::Waiting { .. } => None,
             Phase::Whole => {
@@ -269,7 +274,8 @@ impl Sending {
                     Kind::Middle
                 };
                 let octets = body.get(offset..end).unwrap_or_default();
-                self.phase = Phase::Waiting { until: now + ACKNOWLEDGE_TIME, retried };
+                self.phase = Phase::Waiting { retried };
+                self.waits_until = Deadline::at(now + ACKNOWLEDGE_TIME);
                 Some(Piece::Fragment(Fragment { kind, count: self.count }, octets))
             }
         }
@@ -278,23 +284,23 @@ impl Sending {
     /// The fragment handed out last has reached the wire: the time for its acknowledge runs from
     /// here.
     pub fn sent(&mut self, now: Instant) {
-        if let Phase::Waiting { until, .. } = &mut self.phase {
-            *until = now + ACKNOWLEDGE_TIME;
+        if matches!(self.phase, Phase::Waiting { .. }) {
+            self.waits_until = Deadline::at(now + ACKNOWLEDGE_TIME);
         }
     }
 
-    /// An acknowledge arrived for a body of `length` octets. One with another count, or while none
-    /// is waited for, is ignored; a status other than ok gives the message up.
-    pub const fn acknowledged(&mut self, count: u8, status: u8, length: usize) {
+    /// An acknowledge arrived. One with another count, or while none is waited for, is ignored; a
+    /// status other than ok gives the message up.
+    pub const fn acknowledged(&mut self, count: u8, status: u8) {
         if !matches!(self.phase, Phase::Waiting { .. }) || count != self.count {
             return;
         }
-        let end = self.offset as usize + EXPLICIT_OCTETS;
-        if status != STATUS_OK || end >= length {
-            self.phase = Phase::Idle;
-            return;
+        let end = self.offset.saturating_add(EXPLICIT_OCTETS as u16);
+        if status != STATUS_OK || end >= self.length {
+            return self.stop();
         }
-        self.offset += EXPLICIT_OCTETS as u16;
+        self.waits_until = Deadline::NEVER;
+        self.offset = end;
         self.count = (self.count + 1) & 0x3F;
         self.phase = Phase::Owed { retried: false };
     }
@@ -302,22 +308,19 @@ impl Sending {
     /// Repeats an unacknowledged fragment once, then gives the message up. Returns whether it gave
     /// up.
     pub fn advance(&mut self, now: Instant) -> bool {
-        match self.phase {
-            Phase::Waiting { until, retried } if now >= until => {
-                self.phase = if retried { Phase::Idle } else { Phase::Owed { retried: true } };
-                retried
-            }
-            _ => false,
+        if !self.waits_until.is_due(now) {
+            return false;
         }
+        self.waits_until = Deadline::NEVER;
+        let give_up = self.phase == (Phase::Waiting { retried: true });
+        self.phase = if give_up { Phase::Idle } else { Phase::Owed { retried: true } };
+        give_up
     }
 
     /// When [`advance`](Sending::advance) must run.
     #[must_use]
-    pub const fn deadline(&self) -> Option<Instant> {
-        match self.phase {
-            Phase::Waiting { until, .. } => Some(until),
-            _ => None,
-        }
+    pub const fn deadline(&self) -> Deadline {
+        self.waits_until
     }
 }
 
@@ -356,7 +359,7 @@ mod tests {
         let mut sending = Sending::IDLE;
         let mut reassembly = Reassembly::<512>::new();
         let mut seen = Vec::new();
-        sending.begin(body.len());
+        sending.begin(body.len() as u16);
         while let Some(piece) = sending.next(Instant::ZERO, body) {
             match piece {
                 Piece::Whole(octets) => return (seen, octets.to_vec()),
@@ -364,7 +367,7 @@ mod tests {
                     seen.push((fragment, octets.len()));
                     let received = reassembly.push(fragment, octets);
                     assert_ne!(received, Received::Dropped);
-                    sending.acknowledged(fragment.count, STATUS_OK, body.len());
+                    sending.acknowledged(fragment.count, STATUS_OK);
                 }
             }
         }
@@ -448,10 +451,10 @@ mod tests {
     fn an_unacknowledged_fragment_is_repeated_once_then_given_up() {
         let body = [9; 20];
         let mut sending = Sending::IDLE;
-        sending.begin(body.len());
+        sending.begin(body.len() as u16);
         let first = sending.next(Instant::ZERO, &body);
         assert_eq!(sending.next(Instant::ZERO, &body), None);
-        let second_try = sending.deadline().unwrap();
+        let second_try = sending.deadline().instant().unwrap();
         assert_eq!(second_try, Instant::ZERO + ACKNOWLEDGE_TIME);
         assert!(!sending.advance(second_try));
         assert_eq!(sending.next(second_try, &body), first);

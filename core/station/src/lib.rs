@@ -20,7 +20,7 @@ mod cursor;
 mod time;
 
 pub use cursor::{Full, Reader, Short, Writer};
-pub use time::{Duration, Instant, earlier};
+pub use time::{Deadline, Duration, Instant, earlier};
 
 /// A protocol endpoint without I/O: what arrives and the time go in, what leaves and deadlines
 /// come out.

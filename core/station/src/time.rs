@@ -83,6 +83,67 @@ impl Duration {
     }
 }
 
+/// A deadline, or none, in eight octets: what stations keep for each of their timers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Deadline(Instant);
+
+impl Deadline {
+    /// No deadline.
+    pub const NEVER: Self = Self(Instant(u64::MAX));
+
+    /// A deadline at `instant`.
+    #[must_use]
+    pub const fn at(instant: Instant) -> Self {
+        Self(instant)
+    }
+
+    /// Whether it has been reached.
+    #[must_use]
+    pub const fn is_due(self, now: Instant) -> bool {
+        !self.is_never() && self.0.0 <= now.0
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub const fn is_never(self) -> bool {
+        self.0.0 == u64::MAX
+    }
+
+    /// When it is; `None` for never.
+    #[must_use]
+    pub const fn instant(self) -> Option<Instant> {
+        if self.is_never() { None } else { Some(self.0) }
+    }
+
+    /// The earlier of the two.
+    #[must_use]
+    pub fn or_earlier(self, other: Self) -> Self {
+        self.min(other)
+    }
+
+    /// Takes the deadline away where it has been reached, and says whether it has.
+    pub fn take_due(&mut self, now: Instant) -> bool {
+        let due = self.is_due(now);
+        if due {
+            *self = Self::NEVER;
+        }
+        due
+    }
+}
+
+impl Default for Deadline {
+    /// [`Deadline::NEVER`].
+    fn default() -> Self {
+        Self::NEVER
+    }
+}
+
+impl From<Option<Instant>> for Deadline {
+    fn from(instant: Option<Instant>) -> Self {
+        instant.map_or(Self::NEVER, Self)
+    }
+}
+
 /// The earlier of two deadlines, where `None` means never.
 #[must_use]
 pub fn earlier(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
@@ -172,6 +233,21 @@ mod tests {
         assert_eq!(earlier(at, None), at);
         assert_eq!(earlier(at, Some(Instant::from_nanos(3))), Some(Instant::from_nanos(3)));
         assert_eq!(earlier(None, None), None);
+    }
+
+    #[test]
+    fn a_deadline_is_due_from_its_moment_on_and_never_is_never_due() {
+        let at = |nanos| Instant::from_nanos(nanos);
+        let mut deadline = Deadline::at(at(5));
+        assert!(!deadline.is_due(at(4)));
+        assert!(deadline.is_due(at(5)));
+        assert_eq!(deadline.or_earlier(Deadline::NEVER), deadline);
+        assert!(deadline.take_due(at(6)));
+        assert_eq!(deadline, Deadline::NEVER);
+        assert!(!deadline.is_due(at(u64::MAX)));
+        assert_eq!(deadline.instant(), None);
+        assert_eq!(Deadline::from(Some(at(7))).instant(), Some(at(7)));
+        assert_eq!(size_of::<Deadline>(), 8);
     }
 
     #[test]

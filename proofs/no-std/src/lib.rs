@@ -4,61 +4,150 @@
 //! Only what [`exercise`] reaches is linked, so what a firmware calls belongs there.
 #![no_std]
 
-use codewheel_station::can::{Frame, Identifier, Input};
-use codewheel_station::{Instant, Reader, Station, Writer};
-
-// Linked even while `exercise` does not call into them yet.
-use codewheel_device as _;
-use codewheel_devicenet as _;
-use codewheel_encoder as _;
+use codewheel_device::{DeviceNetEncoder, Event, Factory, Snapshot, Switches, product};
+use codewheel_devicenet::MacId;
+use codewheel_devicenet::scanner::{Response, Scanner, ScannerIdentity, SlaveSettings};
+use codewheel_encoder::{RECORD_OCTETS, Sample, Sensor, choose, encode};
+use codewheel_station::can::{BitRate, Frame, Input};
+use codewheel_station::{Duration, Instant, Reader, Station};
 
 /// Calls into the core crates the way a firmware does. `input` is what the compiler cannot know, so
 /// nothing is computed at compile time; the sum returned keeps everything alive.
+///
+/// Both stations get the same input, a row of frames: two octets of identifier, a length, the data.
 fn exercise(input: &[u8]) -> u32 {
+    let mut sum = Sum(0);
+    encoder(input, &mut sum);
+    scanner(input, &mut sum);
+    sum.0
+}
+
+/// An encoder from power-up to bus-off, with the memory it keeps its settings in, which holds the
+/// first octets of the input.
+fn encoder(input: &[u8], sum: &mut Sum) {
+    let mut slots = [[0; RECORD_OCTETS]; 2];
+    for (to, from) in slots.as_flattened_mut().iter_mut().zip(input) {
+        *to = *from;
+    }
+    let [a, b] = &slots;
+    let start = choose(a, b);
+    let (_, mut sequence) = start.next();
     let mut reader = Reader::new(input);
-    let identifier = reader.u16_le().unwrap_or_default();
-    let Ok(frame) = Frame::new(Identifier::Standard(identifier), reader.rest()) else { return 0 };
-
-    let mut echo = Echo { owed: None };
-    echo.handle(Instant::ZERO, Input::Frame(&frame));
-    echo.advance(Instant::ZERO);
-    let answer = echo.transmit(Instant::ZERO);
-
-    let mut octets = [0; 8];
-    let mut writer = Writer::new(&mut octets);
-    for octet in answer.iter().flat_map(|frame| frame.data()) {
-        if writer.u8(*octet).is_err() {
-            break;
+    let address = reader.u8().unwrap_or_default();
+    let code = reader.u32_le().unwrap_or_default();
+    let products = &product::DEVICENET;
+    let Some(product) = products.get(usize::from(address) % products.len()) else { return };
+    let switches = Switches::set_to(address, BitRate::Kbit500);
+    let factory = Factory::with_serial(code);
+    let sensor = Still { code };
+    let mut device =
+        DeviceNetEncoder::power_up(Instant::ZERO, product, factory, switches, &start, sensor);
+    let now = run(&mut device, Instant::ZERO, input, sum, |device, now| {
+        if let Some(kept) = device.keep() {
+            let [a, _] = &mut slots;
+            *a = encode(&kept, sequence);
+            sequence = sequence.wrapping_add(1);
+            device.kept(now, Ok::<(), ()>(()));
         }
+    });
+    device.handle(now, Input::BusOff);
+    while let Some((at, event)) = device.take_event() {
+        sum.add(&at.as_nanos().to_le_bytes());
+        sum.add(&[u8::from(event == Event::Saved)]);
     }
-    writer.written().iter().fold(u32::from(identifier), |sum, octet| {
-        sum.rotate_left(5).wrapping_add(u32::from(*octet))
-    })
+    let Snapshot { position, velocity, colour, .. } = device.snapshot(now);
+    sum.add(&position.to_le_bytes());
+    sum.add(&velocity.to_le_bytes());
+    sum.add(&[colour as u8]);
+    sum.add(slots.as_flattened());
 }
 
-/// The smallest station: answers each frame with itself.
-struct Echo {
-    owed: Option<Frame>,
-}
-
-impl Station for Echo {
-    type Input<'a> = Input<'a>;
-    type Output = Frame;
-
-    fn handle(&mut self, _: Instant, input: Input<'_>) {
-        if let Input::Frame(frame) = input {
-            self.owed = Some(*frame);
+/// A scanner with two slaves and one request to each.
+fn scanner(input: &[u8], sum: &mut Sum) {
+    let identity = ScannerIdentity { vendor: 1, serial: 1 };
+    let slaves = [5, 6].map(MacId::from_low_bits);
+    let mut scanner: Scanner<2> = Scanner::new(MacId::from_low_bits(0), identity, Duration::ZERO);
+    for mac in slaves {
+        sum.add(&[u8::from(scanner.add(SlaveSettings::poll(mac)).is_ok())]);
+    }
+    let mut now = run(&mut scanner, Instant::ZERO, input, sum, |_, _| {});
+    for mac in slaves {
+        if let Ok(ticket) = scanner.request(mac, &[0x0E, 0x2F, 1, 12], Duration::from_secs(1)) {
+            now = run(&mut scanner, now, input, sum, |_, _| {});
+            scanner.response(ticket, |response| match response {
+                Response::Done(data) => sum.add(data),
+                Response::Refused(error) => sum.add(&[error.general.0, error.additional]),
+                Response::NoAnswer => {}
+            });
+        }
+        if let Some(slave) = scanner.slave(mac) {
+            sum.add(slave.input);
         }
     }
+}
 
-    fn advance(&mut self, _: Instant) {}
+/// Drives `station` through its duplicate MAC ID check and past each frame of `input`, from
+/// `start` on; `serve` comes in each turn. Gives the time of the end.
+fn run<S>(
+    station: &mut S,
+    start: Instant,
+    input: &[u8],
+    sum: &mut Sum,
+    mut serve: impl FnMut(&mut S, Instant),
+) -> Instant
+where
+    S: for<'a> Station<Input<'a> = Input<'a>, Output = Frame>,
+{
+    let mut reader = Reader::new(input);
+    let mut now = start;
+    for _ in 0..TURNS {
+        now = station.deadline().unwrap_or(now + Duration::from_millis(1)).max(now);
+        station.advance(now);
+        if let Some(frame) = frame(&mut reader) {
+            station.handle(now, Input::Frame(&frame));
+        }
+        serve(station, now);
+        while let Some(frame) = station.transmit(now) {
+            sum.add(frame.data());
+            station.handle(now, Input::Sent(&frame));
+        }
+    }
+    now
+}
 
-    fn transmit(&mut self, _: Instant) -> Option<Frame> {
-        self.owed.take()
+/// How often [`run`] turns: enough for the two silent seconds of the check and what follows.
+const TURNS: u32 = 1_000;
+
+fn frame(reader: &mut Reader<'_>) -> Option<Frame> {
+    let identifier = reader.u16_le().ok()?;
+    let length = reader.u8().ok()?;
+    let data = reader.octets(usize::from(length)).ok()?;
+    Some(Frame::standard(identifier, data))
+}
+
+/// A shaft that rests.
+struct Still {
+    code: u32,
+}
+
+impl Sensor for Still {
+    fn sample(&mut self, _: Instant) -> Sample {
+        Sample { code: self.code, cell_low: false }
     }
 
-    fn deadline(&self) -> Option<Instant> {
+    fn changes_at(&self, _: Instant) -> Option<Instant> {
         None
+    }
+}
+
+/// What is seen, folded into one number.
+struct Sum(u32);
+
+impl Sum {
+    fn add(&mut self, octets: &[u8]) {
+        for octet in octets {
+            self.0 = self.0.rotate_left(5).wrapping_add(u32::from(*octet));
+        }
     }
 }
 

@@ -2,11 +2,12 @@
 
 use codewheel_devicenet::explicit::{Error, GeneralStatus, Path, Service};
 use codewheel_devicenet::{
-    Application, Class, Done, Identity, NetworkSettings, Request, Reset, Server, SwitchPositions,
+    Application, Class, Done, Identity, MacId, NetworkSettings, Request, Reset, Server,
+    SwitchPositions,
 };
 use codewheel_encoder::{Block, Encoder, Sensor, Start};
 use codewheel_station::can::BitRate;
-use codewheel_station::{Duration, Instant, Writer, earlier};
+use codewheel_station::{Deadline, Duration, Instant, Writer};
 
 use super::Factory;
 use super::rows::{ENCODER_POSITION, Row, View};
@@ -30,15 +31,15 @@ pub(super) struct Body<S> {
     pub(super) product: &'static Product,
     pub(super) factory: Factory,
     pub(super) switches: Switches,
-    /// The switches as they were read at power-up.
-    pub(super) read_switches: Switches,
+    /// The address in force, as the switches gave it at power-up.
+    pub(super) mac: Option<MacId>,
     pub(super) sensor: S,
     pub(super) encoder: Encoder,
     pub(super) keeping: Keeping,
     pub(super) events: Events,
     pub(super) powered_at: Instant,
-    /// When the shaft must be looked at; `None` while it rests.
-    pub(super) next_sample: Option<Instant>,
+    /// When the shaft must be looked at; never while it rests.
+    pub(super) next_sample: Deadline,
 }
 
 impl<S: Sensor> Body<S> {
@@ -82,13 +83,13 @@ impl<S: Sensor> Body<S> {
             product,
             factory,
             switches,
-            read_switches: switches,
+            mac: switches.mac(),
             sensor,
             encoder,
             keeping,
             events,
             powered_at: now,
-            next_sample: None,
+            next_sample: Deadline::NEVER,
         };
         body.wake(now);
         body
@@ -97,9 +98,9 @@ impl<S: Sensor> Body<S> {
     /// What every power-up does: read the switches, look at the shaft.
     fn wake(&mut self, now: Instant) {
         self.powered_at = now;
-        self.read_switches = self.switches;
+        self.mac = self.switches.mac();
         self.events.push(now, Event::PowerUp);
-        if self.switches.mac().is_none() {
+        if self.mac.is_none() {
             self.events.push(now, Event::IllegalAddress { switches: self.switches.address() });
         }
         self.sample(now);
@@ -113,10 +114,10 @@ impl<S: Sensor> Body<S> {
         self.wake(now);
     }
 
-    /// A server for the switches and the network settings as they are now.
+    /// A server for the switches as they are at power-up and the network settings as they are kept.
     pub(super) fn server(&self) -> Server {
-        let bit_rate = self.read_switches.bit_rate();
-        match self.read_switches.mac() {
+        let bit_rate = self.switches.bit_rate();
+        match self.mac {
             Some(mac) => Server::new(mac, bit_rate, self.keeping.network),
             None => Server::off_the_bus(bit_rate, self.keeping.network),
         }
@@ -127,7 +128,9 @@ impl<S: Sensor> Body<S> {
         let (alarm, warning) = (self.encoder.alarm(), self.encoder.warning());
         let sample = self.sensor.sample(now);
         self.encoder.sample(now, sample);
-        self.next_sample = self.sensor.changes_at(now).map(|at| at.max(now + SAMPLE_TIME));
+        let changes_at = self.sensor.changes_at(now);
+        self.next_sample =
+            changes_at.map_or(Deadline::NEVER, |at| Deadline::at(at.max(now + SAMPLE_TIME)));
         if (alarm, warning) != (self.encoder.alarm(), self.encoder.warning()) {
             self.flags_changed(now, alarm, warning);
         }
@@ -154,7 +157,7 @@ impl<S: Sensor> Body<S> {
 
     /// Runs what fell due; whether a pending Save has failed.
     pub(super) fn advance(&mut self, now: Instant) -> bool {
-        if self.next_sample.is_some_and(|at| now >= at) {
+        if self.next_sample.is_due(now) {
             self.sample(now);
         }
         if self.encoder.deadline().is_some_and(|at| now >= at) {
@@ -169,9 +172,9 @@ impl<S: Sensor> Body<S> {
         overdue
     }
 
-    pub(super) fn deadline(&self) -> Option<Instant> {
-        let flags = earlier(self.encoder.deadline(), self.keeping.deadline());
-        earlier(self.next_sample, flags)
+    pub(super) fn deadline(&self) -> Deadline {
+        let flags = Deadline::from(self.encoder.deadline());
+        flags.min(self.keeping.deadline()).min(self.next_sample)
     }
 
     fn view(&self) -> View<'_> {

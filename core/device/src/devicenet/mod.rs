@@ -7,7 +7,7 @@ use codewheel_devicenet::explicit::GeneralStatus;
 use codewheel_devicenet::{MacId, Server};
 use codewheel_encoder::{Encoder, Kept, Sensor, Start};
 use codewheel_station::can::{self, Filter, Frame};
-use codewheel_station::{Instant, Station, earlier};
+use codewheel_station::{Deadline, Instant, Station};
 
 use self::body::Body;
 use crate::event::Event;
@@ -93,7 +93,7 @@ impl<S: Sensor> DeviceNetEncoder<S> {
     /// The sensor. Whoever changes it makes the device look at it at its next
     /// [`advance`](Station::advance).
     pub const fn sensor_mut(&mut self) -> &mut S {
-        self.body.next_sample = Some(Instant::ZERO);
+        self.body.next_sample = Deadline::at(Instant::ZERO);
         &mut self.body.sensor
     }
 
@@ -110,8 +110,8 @@ impl<S: Sensor> DeviceNetEncoder<S> {
 
     /// The address in force; `None` while the switches hold the device off the bus.
     #[must_use]
-    pub fn mac(&self) -> Option<MacId> {
-        self.body.read_switches.mac()
+    pub const fn mac(&self) -> Option<MacId> {
+        self.body.mac
     }
 
     /// The frames this device wants to see.
@@ -212,6 +212,6 @@ impl<S: Sensor> Station for DeviceNetEncoder<S> {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        earlier(self.server.deadline(), self.body.deadline())
+        Deadline::from(self.server.deadline()).min(self.body.deadline()).instant()
     }
 }

@@ -1,7 +1,7 @@
 //! One explicit request to a slave and its response, fragmented both ways where needed.
 
 use codewheel_station::can::Frame;
-use codewheel_station::{Duration, Instant, earlier};
+use codewheel_station::{Deadline, Duration, Instant};
 
 use crate::MacId;
 use crate::explicit::{Error, GeneralStatus, Header, Service};
@@ -57,44 +57,42 @@ pub(super) struct Exchange {
     port: Port,
     state: State,
     request: [u8; REQUEST_OCTETS],
-    length: u8,
     sending: Sending,
     acknowledge: Option<(u8, u8)>,
     response: Reassembly<RESPONSE_OCTETS>,
     patience: Duration,
-    silent_at: Option<Instant>,
+    /// When the slave counts as silent, while something is waited for.
+    silent_at: Deadline,
 }
 
 impl Exchange {
     pub(super) const fn new(master: MacId, slave: MacId) -> Self {
         Self {
             slave,
-            header: Header { fragmented: false, transaction: false, mac: master },
+            header: Header(master.value()),
             port: Port::Unconnected,
             state: State::Idle,
             request: [0; REQUEST_OCTETS],
-            length: 0,
             sending: Sending::IDLE,
             acknowledge: None,
             response: Reassembly::new(),
             patience: ANSWER_TIME,
-            silent_at: None,
+            silent_at: Deadline::NEVER,
         }
     }
 
     /// Begins to send `body`, at most [`REQUEST_OCTETS`] long; what was on its way is given up.
     pub(super) fn begin(&mut self, port: Port, body: &[u8], patience: Duration) {
         self.port = port;
-        self.header.transaction = !self.header.transaction;
+        self.header = self.header.of_next_transaction();
         for (to, from) in self.request.iter_mut().zip(body) {
             *to = *from;
         }
-        self.length = body.len().min(REQUEST_OCTETS) as u8;
-        self.sending.begin(usize::from(self.length));
+        self.sending.begin(body.len().min(REQUEST_OCTETS) as u16);
         self.response.clear();
         self.acknowledge = None;
         self.patience = patience;
-        self.silent_at = None;
+        self.silent_at = Deadline::NEVER;
         self.state = State::Asking;
     }
 
@@ -103,18 +101,18 @@ impl Exchange {
         self.state = State::Idle;
         self.sending.stop();
         self.acknowledge = None;
-        self.silent_at = None;
+        self.silent_at = Deadline::NEVER;
     }
 
     /// An explicit response of the slave, without its header octet.
     pub(super) fn heard(&mut self, now: Instant, header: Header, rest: &[u8]) {
         if self.state != State::Asking
-            || header.mac != self.header.mac
-            || header.transaction != self.header.transaction
+            || header.mac() != self.header.mac()
+            || header.transaction() != self.header.transaction()
         {
             return;
         }
-        if !header.fragmented {
+        if !header.fragmented() {
             self.response.clear();
             let only = Fragment { kind: Kind::First, count: crate::fragment::FIRST_AND_ONLY };
             self.response.push(only, rest);
@@ -122,10 +120,10 @@ impl Exchange {
         }
         let [octet, octets @ ..] = rest else { return };
         let fragment = Fragment::from_octet(*octet);
-        self.silent_at = Some(now + self.patience);
+        self.silent_at = Deadline::at(now + self.patience);
         if fragment.kind == Kind::Acknowledge {
             if let [status, ..] = octets {
-                self.sending.acknowledged(fragment.count, *status, usize::from(self.length));
+                self.sending.acknowledged(fragment.count, *status);
             }
             return;
         }
@@ -148,7 +146,7 @@ impl Exchange {
         if service == Service::ERROR.response() || service == Service(asked).response() {
             self.state = State::Answered;
             self.sending.stop();
-            self.silent_at = None;
+            self.silent_at = Deadline::NEVER;
         }
     }
 
@@ -170,17 +168,17 @@ impl Exchange {
     }
 
     pub(super) fn advance(&mut self, now: Instant) {
-        if self.sending.advance(now) || self.silent_at.is_some_and(|at| now >= at) {
+        if self.sending.advance(now) || self.silent_at.is_due(now) {
             self.sending.stop();
-            self.silent_at = None;
+            self.silent_at = Deadline::NEVER;
             if self.state == State::Asking {
                 self.state = State::Silent;
             }
         }
     }
 
-    pub(super) fn deadline(&self) -> Option<Instant> {
-        earlier(self.sending.deadline(), self.silent_at)
+    pub(super) fn deadline(&self) -> Deadline {
+        self.sending.deadline().min(self.silent_at)
     }
 
     /// Whether [`transmit`](Self::transmit) has something.
@@ -195,21 +193,20 @@ impl Exchange {
         };
         let identifier = group_2(self.slave, message);
         if let Some((count, status)) = self.acknowledge.take() {
-            let header = self.header.with_fragmented(true).to_octet();
+            let header = self.header.with_fragmented(true).0;
             let fragment = Fragment { kind: Kind::Acknowledge, count };
             return Some(Frame::standard(identifier, &[header, fragment.to_octet(), status]));
         }
-        let body = self.request.get(..usize::from(self.length)).unwrap_or_default();
-        let frame = match self.sending.next(now, body)? {
+        let frame = match self.sending.next(now, &self.request)? {
             Piece::Whole(octets) => {
-                frame(identifier, &[self.header.with_fragmented(false).to_octet()], octets)
+                frame(identifier, &[self.header.with_fragmented(false).0], octets)
             }
             Piece::Fragment(fragment, octets) => {
-                let header = self.header.with_fragmented(true).to_octet();
+                let header = self.header.with_fragmented(true).0;
                 frame(identifier, &[header, fragment.to_octet()], octets)
             }
         };
-        self.silent_at = Some(now + self.patience);
+        self.silent_at = Deadline::at(now + self.patience);
         Some(frame)
     }
 }

@@ -5,7 +5,7 @@ mod exchange;
 mod slave;
 
 use codewheel_station::can::{self, Filter, Frame};
-use codewheel_station::{Duration, Instant, Station, earlier};
+use codewheel_station::{Deadline, Duration, Instant, Station};
 
 use self::exchange::{Outcome, Port, REQUEST_OCTETS};
 use self::slave::Slave;
@@ -159,6 +159,11 @@ pub struct Scanner<const SLAVES: usize = 63> {
     slaves: [Option<Slave>; SLAVES],
     /// Place of each address among the slaves, plus one.
     places: [u8; 64],
+    /// No slave falls due before this. It may be early, for a deadline that moves on is not noted,
+    /// but is never late. So most frames need not look at every slave.
+    slaves_due: Deadline,
+    /// No exchange has a frame to send unless this is set. In the same way it may be set in vain.
+    owed: bool,
     cycle: Cycle,
     interval: Duration,
     interscan_delay: Duration,
@@ -177,6 +182,8 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
             network: DuplicateMacCheck::begin(mac),
             slaves: [const { None }; SLAVES],
             places: [0; 64],
+            slaves_due: Deadline::NEVER,
+            owed: false,
             cycle: Cycle::Pause { until: Instant::ZERO },
             interval,
             interscan_delay: Duration::ZERO,
@@ -212,7 +219,8 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
         let (Some((slave, number)), Some(place)) = (free, self.places.get_mut(address)) else {
             return Err(NotAdded::Full);
         };
-        *slave = Some(Slave::new(settings, self.mac));
+        let added = slave.insert(Slave::new(settings, self.mac));
+        self.slaves_due = self.slaves_due.min(added.deadline());
         *place = number;
         Ok(())
     }
@@ -272,19 +280,20 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
         if body.is_empty() || body.len() > REQUEST_OCTETS {
             return Err(NotTaken::Length);
         }
-        let place = self.place(mac).ok_or(NotTaken::UnknownSlave)?;
-        let slave =
-            self.slaves.get_mut(place).and_then(Option::as_mut).ok_or(NotTaken::UnknownSlave)?;
-        if slave.ticket.is_some() || slave.unanswered.is_some() {
-            return Err(NotTaken::Busy);
-        }
-        if !slave.is_running() {
-            return Err(NotTaken::NotRunning);
-        }
         let ticket = Ticket(self.tickets);
+        self.change(mac, |slave| {
+            if slave.ticket.is_some() || slave.unanswered.is_some() {
+                return Err(NotTaken::Busy);
+            }
+            if !slave.is_running() {
+                return Err(NotTaken::NotRunning);
+            }
+            slave.ticket = Some(ticket);
+            slave.exchange.begin(Port::Connected, body, patience);
+            Ok(())
+        })
+        .unwrap_or(Err(NotTaken::UnknownSlave))?;
         self.tickets = self.tickets.wrapping_add(1);
-        slave.ticket = Some(ticket);
-        slave.exchange.begin(Port::Connected, body, patience);
         Ok(ticket)
     }
 
@@ -311,9 +320,15 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
         usize::from(place).checked_sub(1)
     }
 
-    fn slave_mut(&mut self, mac: MacId) -> Option<&mut Slave> {
+    /// Changes the slave at `mac`, and notes what it has to send and when it falls due then; `None`
+    /// where none was added.
+    fn change<T>(&mut self, mac: MacId, change: impl FnOnce(&mut Slave) -> T) -> Option<T> {
         let place = self.place(mac)?;
-        self.slaves.get_mut(place)?.as_mut()
+        let slave = self.slaves.get_mut(place)?.as_mut()?;
+        let result = change(slave);
+        self.slaves_due = self.slaves_due.min(slave.deadline());
+        self.owed |= slave.exchange.is_owed();
+        Some(result)
     }
 
     fn frame(&mut self, now: Instant, frame: &Frame) {
@@ -325,23 +340,21 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
             Identifier::Group2 { mac, message: DUPLICATE_MAC_CHECK } => {
                 if mac == self.mac {
                     self.network.heard(frame.data());
-                } else if CheckMessage::parse(frame.data()).is_ok_and(|check| !check.response)
-                    && let Some(slave) = self.slave_mut(mac)
-                {
-                    slave.booted(now);
+                } else if CheckMessage::parse(frame.data()).is_ok_and(|check| !check.response) {
+                    self.change(mac, |slave| slave.booted(now));
                 }
             }
             _ if !self.network.is_on_line() => {}
             Identifier::Group1 { message: POLL_RESPONSE, source } => {
-                if let Some(slave) = self.slave_mut(source) {
-                    slave.response(now, frame.data());
-                }
+                self.change(source, |slave| slave.response(now, frame.data()));
                 self.close_cycle(now);
             }
             Identifier::Group2 { mac, message: EXPLICIT_RESPONSE } => {
-                if let (Some(slave), [first, rest @ ..]) = (self.slave_mut(mac), frame.data()) {
-                    slave.exchange.heard(now, Header::from_octet(*first), rest);
-                    slave.advance(now);
+                if let [first, rest @ ..] = frame.data() {
+                    self.change(mac, |slave| {
+                        slave.exchange.heard(now, Header(*first), rest);
+                        slave.advance(now);
+                    });
                 }
             }
             _ => {}
@@ -409,8 +422,12 @@ impl<const SLAVES: usize> Station for Scanner<SLAVES> {
         if !self.network.is_on_line() {
             return;
         }
-        for slave in self.slaves.iter_mut().flatten() {
-            slave.advance(now);
+        if self.slaves_due.take_due(now) {
+            for slave in self.slaves.iter_mut().flatten() {
+                slave.advance(now);
+                self.slaves_due = self.slaves_due.min(slave.deadline());
+            }
+            self.owed = true;
         }
         self.close_cycle(now);
     }
@@ -422,26 +439,30 @@ impl<const SLAVES: usize> Station for Scanner<SLAVES> {
         if let Some(frame) = self.network.transmit(self.identity.vendor, self.identity.serial) {
             return Some(frame);
         }
-        self.slaves
-            .iter_mut()
-            .flatten()
-            .filter(|slave| slave.exchange.is_owed())
-            .find_map(|slave| slave.exchange.transmit(now))
-            .or_else(|| self.next_poll(now))
+        if self.owed {
+            for slave in self.slaves.iter_mut().flatten() {
+                if let Some(frame) = slave.exchange.transmit(now) {
+                    self.slaves_due = self.slaves_due.min(slave.deadline());
+                    return Some(frame);
+                }
+            }
+            self.owed = false;
+        }
+        self.next_poll(now)
     }
 
     fn deadline(&self) -> Option<Instant> {
         if !self.network.is_on_line() {
-            return self.network.deadline();
+            return self.network.deadline().instant();
         }
         let cycle = match self.cycle {
             Cycle::Pause { until } => {
                 let running = self.slaves.iter().flatten().any(Slave::is_running);
-                running.then_some(until)
+                Deadline::from(running.then_some(until))
             }
-            Cycle::Polling { .. } => None,
-            Cycle::Collecting { until, .. } => Some(until),
+            Cycle::Polling { .. } => Deadline::NEVER,
+            Cycle::Collecting { until, .. } => Deadline::at(until),
         };
-        self.slaves.iter().flatten().map(Slave::deadline).fold(cycle, earlier)
+        cycle.min(self.slaves_due).instant()
     }
 }

@@ -1,6 +1,6 @@
 //! What the scanner knows of one slave, and the steps that bring it to data exchange.
 
-use codewheel_station::{Duration, Instant, earlier};
+use codewheel_station::{Deadline, Duration, Instant};
 
 use super::exchange::{ANSWER_TIME, Exchange, Outcome, Port};
 use super::{Refusal, SlaveSettings, SlaveState, Ticket};
@@ -73,7 +73,7 @@ pub(super) struct Slave {
     /// The slave was polled in this cycle and has not answered yet.
     pub(super) awaited: bool,
     /// When the slave is given up unless it answers a poll.
-    lost_at: Option<Instant>,
+    lost_at: Deadline,
     pub(super) polls: u64,
     pub(super) responses: u64,
     pub(super) losses: u32,
@@ -95,7 +95,7 @@ impl Slave {
             produced_size: 0,
             input_at: None,
             awaited: false,
-            lost_at: None,
+            lost_at: Deadline::NEVER,
             polls: 0,
             responses: 0,
             losses: 0,
@@ -135,7 +135,7 @@ impl Slave {
     fn leave(&mut self, now: Instant, time: Duration) {
         self.phase = Phase::Waiting { until: now + time };
         self.awaited = false;
-        self.lost_at = None;
+        self.lost_at = Deadline::NEVER;
         self.unanswered = self.ticket.take().or(self.unanswered);
         self.exchange.stop();
     }
@@ -245,8 +245,9 @@ impl Slave {
                 self.refusal = None;
                 self.phase = Phase::Running;
                 // The slave grants the first interval ten seconds; we are as patient.
-                self.lost_at =
-                    self.patience().map(|time| now + time.max(connection::PRE_CONSUMPTION_TIME));
+                self.lost_at = self.patience().map_or(Deadline::NEVER, |time| {
+                    Deadline::at(now + time.max(connection::PRE_CONSUMPTION_TIME))
+                });
             }
         }
     }
@@ -288,7 +289,7 @@ impl Slave {
         self.input_length = data.len().min(INPUT_OCTETS) as u8;
         self.input_at = Some(now);
         self.responses += 1;
-        self.lost_at = self.patience().map(|time| now + time);
+        self.lost_at = self.patience().map_or(Deadline::NEVER, |time| Deadline::at(now + time));
     }
 
     pub(super) fn advance(&mut self, now: Instant) {
@@ -300,7 +301,7 @@ impl Slave {
             Phase::Waiting { .. } => {}
             Phase::Configuring { step } => self.conclude(now, step),
             Phase::Running => {
-                if self.lost_at.is_some_and(|at| now >= at) {
+                if self.lost_at.is_due(now) {
                     self.losses += 1;
                     self.leave(now, Duration::ZERO);
                 }
@@ -308,11 +309,11 @@ impl Slave {
         }
     }
 
-    pub(super) fn deadline(&self) -> Option<Instant> {
+    pub(super) fn deadline(&self) -> Deadline {
         let phase = match self.phase {
-            Phase::Waiting { until } => Some(until),
-            _ => None,
+            Phase::Waiting { until } => Deadline::at(until),
+            _ => Deadline::NEVER,
         };
-        earlier(earlier(phase, self.lost_at), self.exchange.deadline())
+        phase.min(self.lost_at).min(self.exchange.deadline())
     }
 }

@@ -46,20 +46,20 @@ impl Server {
         app: &mut A,
     ) {
         let Some((&first, body)) = data.split_first() else { return };
-        let header = Header::from_octet(first);
+        let header = Header(first);
         let Some((&service, rest)) = body.split_first() else { return };
-        if !header.fragmented && service >= 0x80 {
+        if !header.fragmented() && service >= 0x80 {
             return;
         }
         let service = Service(service);
         let mut octets = [0; 2];
         let mut out = Writer::new(&mut octets);
-        let result = match (header.fragmented, service, rest) {
+        let result = match (header.fragmented(), service, rest) {
             (false, Service::ALLOCATE, [class::DEVICENET, 1, data @ ..]) => {
                 self.allocate(now, data, &mut out, app)
             }
             (false, Service::RELEASE, [class::DEVICENET, 1, data @ ..]) => {
-                self.release(now, data, header.mac, app)
+                self.release(now, data, header.mac(), app)
             }
             (false, Service::ALLOCATE | Service::RELEASE, [] | [_]) => {
                 Err(refuse(GeneralStatus::NOT_ENOUGH_DATA))

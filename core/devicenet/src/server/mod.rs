@@ -11,7 +11,7 @@ mod objects;
 mod router;
 
 use codewheel_station::can::{self, BitRate, Filter, Frame};
-use codewheel_station::{Instant, earlier};
+use codewheel_station::{Deadline, Instant};
 
 use crate::connection::{Connection, EXPLICIT, POLL, State};
 use crate::duplicate::Change;
@@ -87,7 +87,6 @@ pub struct Server {
     request: Reassembly<REQUEST_OCTETS>,
     /// The response on its way out.
     response: [u8; RESPONSE_OCTETS],
-    response_length: u8,
     response_header: Header,
     sending: Sending,
     /// A fragment to be acknowledged: its header, count and status.
@@ -113,8 +112,7 @@ impl Server {
             poll: None,
             request: Reassembly::new(),
             response: [0; RESPONSE_OCTETS],
-            response_length: 0,
-            response_header: Header::from_octet(0),
+            response_header: Header(0),
             sending: Sending::IDLE,
             acknowledge: None,
             unconnected: None,
@@ -247,9 +245,6 @@ impl Server {
 
     /// Runs what fell due up to `now`.
     pub fn advance<A: Application>(&mut self, now: Instant, app: &mut A) {
-        if self.deadline().is_none_or(|deadline| now < deadline) {
-            return;
-        }
         if self.network.advance(now) == Some(Change::OnLine) {
             app.notice(now, Event::OnLine);
         }
@@ -343,18 +338,18 @@ impl Server {
 
     fn explicit_request<A: Application>(&mut self, now: Instant, data: &[u8], app: &mut A) {
         let Some((&first, rest)) = data.split_first() else { return };
-        let header = Header::from_octet(first);
-        if self.master != Some(header.mac) || rest.is_empty() {
+        let header = Header(first);
+        if self.master != Some(header.mac()) || rest.is_empty() {
             return;
         }
         let Some(connection) = &mut self.explicit else { return };
-        if header.fragmented && rest.len() < 2 {
+        if header.fragmented() && rest.len() < 2 {
             // A fragmentation octet with nothing behind it is no fragment.
             return;
         }
         connection.state = State::Established;
         connection.arm(now);
-        if !header.fragmented {
+        if !header.fragmented() {
             self.request.clear();
             self.request(now, header, rest, app);
             return;
@@ -363,11 +358,7 @@ impl Server {
         let fragment = Fragment::from_octet(second);
         if fragment.kind == Kind::Acknowledge {
             if let Some(&status) = octets.first() {
-                self.sending.acknowledged(
-                    fragment.count,
-                    status,
-                    usize::from(self.response_length),
-                );
+                self.sending.acknowledged(fragment.count, status);
             }
             return;
         }
@@ -432,7 +423,7 @@ impl Server {
         let mut octets = [0; 8];
         if let Some((header, body, length)) = self.unconnected.take() {
             let [first, rest @ ..] = &mut octets;
-            *first = header.with_fragmented(false).to_octet();
+            *first = header.with_fragmented(false).0;
             for (to, from) in rest.iter_mut().zip(body) {
                 *to = from;
             }
@@ -441,7 +432,7 @@ impl Server {
         }
         if let Some((header, count, status)) = self.acknowledge.take() {
             let fragment = Fragment { kind: Kind::Acknowledge, count };
-            let header = header.with_fragmented(true).to_octet();
+            let header = header.with_fragmented(true).0;
             return Some(Frame::standard(identifier, &[header, fragment.to_octet(), status]));
         }
         if self.sending.is_idle()
@@ -453,15 +444,14 @@ impl Server {
         if !self.sending.is_owed() {
             return None;
         }
-        let body = self.response.get(..usize::from(self.response_length)).unwrap_or_default();
         let [first, rest @ ..] = &mut octets;
-        let (end, piece) = match self.sending.next(now, body)? {
+        let (end, piece) = match self.sending.next(now, &self.response)? {
             Piece::Whole(octets) => {
-                *first = self.response_header.with_fragmented(false).to_octet();
+                *first = self.response_header.with_fragmented(false).0;
                 (1, octets)
             }
             Piece::Fragment(fragment, octets) => {
-                *first = self.response_header.with_fragmented(true).to_octet();
+                *first = self.response_header.with_fragmented(true).0;
                 let [second, ..] = rest;
                 *second = fragment.to_octet();
                 (2, octets)
@@ -490,16 +480,16 @@ impl Server {
             }
         };
         self.response_header = header;
-        self.response_length = length as u8;
-        self.sending.begin(length);
+        self.sending.begin(length as u16);
     }
 
     /// When [`advance`](Self::advance) must run.
     #[must_use]
     pub fn deadline(&self) -> Option<Instant> {
-        let explicit = self.explicit.as_ref().and_then(Connection::deadline);
-        let poll = self.poll.as_ref().and_then(|io| io.connection.deadline());
-        earlier(earlier(self.network.deadline(), self.sending.deadline()), earlier(explicit, poll))
+        let explicit = self.explicit.as_ref().map_or(Deadline::NEVER, Connection::deadline);
+        let poll = self.poll.as_ref().map_or(Deadline::NEVER, |io| io.connection.deadline());
+        let own = self.network.deadline().min(self.sending.deadline());
+        own.min(explicit).min(poll).instant()
     }
 }
 
