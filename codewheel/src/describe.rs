@@ -70,7 +70,8 @@ I/O assemblies (poll)
     }
     writeln!(out, "{}\n", table.trim_fmt())?;
     for row in &ROWS {
-        writeln!(out, "  {:<24}{}", row.key, row.help)?;
+        let space = if row.note.is_empty() { "" } else { " " };
+        writeln!(out, "  {:<24}{}.{space}{}", row.key, row.help, row.note)?;
     }
     writeln!(
         out,

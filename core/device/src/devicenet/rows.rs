@@ -109,8 +109,15 @@ pub struct Row {
     pub source: Source,
     /// The unit; empty where there is none.
     pub unit: &'static str,
-    /// One sentence that helps.
+    /// The name the Parameter object gives, at most 16 printable characters: the manual's longer
+    /// names get short forms here, once.
+    pub short_name: &'static str,
+    /// One sentence that helps, at most 64 printable characters: the Parameter object carries it.
     pub help: &'static str,
+    /// What else is worth knowing; empty where nothing is.
+    pub note: &'static str,
+    /// Whether a reading changes while the device runs.
+    pub changes: bool,
     /// The names of the values 0, 1, … where they are enumerated.
     pub values: &'static [&'static str],
     /// Reads the attribute.
@@ -165,7 +172,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Usint,
         source: Source::Reading,
         unit: "",
-        help: "Number of supported attributes.",
+        short_name: "No. attributes",
+        help: "Number of supported attributes",
+        note: "",
+        changes: false,
         values: &[],
         read: |_| Value::Number(ATTRIBUTES.len() as i64),
         write: None,
@@ -178,7 +188,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::UsintArray,
         source: Source::Reading,
         unit: "",
-        help: "List of supported attributes.",
+        short_name: "Attributes",
+        help: "List of supported attributes",
+        note: "",
+        changes: false,
         values: &[],
         read: |_| Value::Octets(&ATTRIBUTES),
         write: None,
@@ -191,7 +204,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Bool,
         source: Source::Parameter,
         unit: "",
-        help: "Which way the position grows, looking at the flange. A change clears the preset.",
+        short_name: "Rotation sense",
+        help: "Position grows CW or CCW, seen looking at the flange",
+        note: "A change clears preset and offset.",
+        changes: true,
         values: &["CW", "CCW"],
         read: |view| Value::Number(is_ccw(view)),
         write: Some(|encoder, value| {
@@ -206,7 +222,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Bool,
         source: Source::Reading,
         unit: "",
-        help: "Not used.",
+        short_name: "Int. diagnostics",
+        help: "Not used",
+        note: "",
+        changes: false,
         values: &["OFF", "ON"],
         read: |_| Value::Number(0),
         write: None,
@@ -219,7 +238,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Bool,
         source: Source::Reading,
         unit: "",
-        help: "The scaling function is always on.",
+        short_name: "Scaling function",
+        help: "Scaling is always on",
+        note: "",
+        changes: false,
         values: &["OFF", "ON"],
         read: |_| Value::Number(1),
         write: None,
@@ -232,7 +254,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Usint,
         source: Source::Reading,
         unit: "",
-        help: "The position counts steps.",
+        short_name: "Position format",
+        help: "The position counts steps",
+        note: "",
+        changes: false,
         values: &["Steps"],
         read: |_| Value::Number(0),
         write: None,
@@ -244,9 +269,11 @@ pub static ROWS: [Row; 24] = [
         key: "steps-per-turn",
         data_type: DataType::Udint,
         source: Source::Parameter,
-        unit: "steps",
-        help: "Steps of one turn. A change keeps the turns, sets the total to steps × turns and \
-               clears the preset.",
+        unit: "step",
+        short_name: "Steps per turn",
+        help: "Number of steps per turn",
+        note: "A change keeps the turns as programmed, sets the total resolution to steps × turns, and clears preset and offset.",
+        changes: true,
         values: &[],
         read: |view| Value::Number(steps(view)),
         write: Some(|encoder, value| encoder.set_steps_per_turn(unsigned(value))),
@@ -258,9 +285,11 @@ pub static ROWS: [Row; 24] = [
         key: "total-resolution",
         data_type: DataType::Udint,
         source: Source::Parameter,
-        unit: "steps",
-        help: "Steps of the whole measuring range: steps per turn × turns. A change clears the \
-               preset. On singleturn encoders it is the steps per turn.",
+        unit: "step",
+        short_name: "Total resolution",
+        help: "Steps over the whole measuring range: steps per turn x turns",
+        note: "A change clears preset and offset. On singleturn encoders it is the steps per turn.",
+        changes: true,
         values: &[],
         read: |view| Value::Number(total(view)),
         write: Some(|encoder, value| encoder.set_total_resolution(unsigned(value))),
@@ -277,7 +306,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Udint,
         source: Source::Reading,
         unit: "",
-        help: "Reserved.",
+        short_name: "Measuring steps",
+        help: "Reserved, not used",
+        note: "",
+        changes: false,
         values: &[],
         read: |_| Value::Number(0),
         write: None,
@@ -289,8 +321,11 @@ pub static ROWS: [Row; 24] = [
         key: "preset",
         data_type: DataType::Udint,
         source: Source::Parameter,
-        unit: "steps",
-        help: "Makes the current position this value. Use it at standstill.",
+        unit: "step",
+        short_name: "Preset value",
+        help: "The current position becomes this value; use it at standstill",
+        note: "The offset that does it lasts until the next power-up unless it is saved.",
+        changes: true,
         values: &[],
         read: |view| Value::Number(i64::from(view.encoder.preset())),
         write: Some(|encoder, value| encoder.set_preset(unsigned(value)).map(|()| true)),
@@ -302,8 +337,11 @@ pub static ROWS: [Row; 24] = [
         key: "cos-delta",
         data_type: DataType::Dint,
         source: Source::Parameter,
-        unit: "steps",
-        help: "The change of position that makes the encoder produce in change of state mode.",
+        unit: "step",
+        short_name: "COS delta",
+        help: "Change of position that is produced in change of state mode",
+        note: "",
+        changes: true,
         values: &[],
         read: |view| Value::Number(i64::from(view.encoder.cos_delta())),
         write: Some(|encoder, value| {
@@ -317,8 +355,11 @@ pub static ROWS: [Row; 24] = [
         key: "position",
         data_type: DataType::Dint,
         source: Source::Reading,
-        unit: "steps",
-        help: "The current position.",
+        unit: "step",
+        short_name: "Position value",
+        help: "Current position",
+        note: "",
+        changes: true,
         values: &[],
         read: |view| Value::Number(i64::from(view.encoder.position())),
         write: None,
@@ -331,7 +372,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Usint,
         source: Source::Reading,
         unit: "",
-        help: "Bit 0 counterclockwise, bit 1 diagnosis supported, bit 2 scaling on.",
+        short_name: "Operating status",
+        help: "Bit 0 CCW, bit 1 diagnosis supported, bit 2 scaling on",
+        note: "",
+        changes: true,
         values: &[],
         read: |view| Value::Number(is_ccw(view) | DIAGNOSIS_SUPPORTED | SCALING_ON),
         write: None,
@@ -343,8 +387,11 @@ pub static ROWS: [Row; 24] = [
         key: "singleturn-resolution",
         data_type: DataType::Udint,
         source: Source::Reading,
-        unit: "steps",
-        help: "Internal resolution of one turn.",
+        unit: "step",
+        short_name: "Singleturn res.",
+        help: "Internal steps per turn",
+        note: "",
+        changes: false,
         values: &[],
         read: |view| Value::Number(resolution(view)),
         write: None,
@@ -357,7 +404,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Uint,
         source: Source::Reading,
         unit: "",
-        help: "Internal number of revolutions: 65535 stands for 65536, 0 for singleturn.",
+        short_name: "Revolutions",
+        help: "Internal number of revolutions; 65535 stands for 65536",
+        note: "0 for singleturn encoders.",
+        changes: false,
         values: &[],
         read: |view| Value::Number(i64::from(view.product.number_of_revolutions())),
         write: None,
@@ -370,7 +420,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Uint,
         source: Source::Reading,
         unit: "",
-        help: "Bit 0: position error; it ends by itself after 2.5 s.",
+        short_name: "Alarm signals",
+        help: "Bit 0 position error",
+        note: "It ends by itself after 2.5 s.",
+        changes: true,
         values: &[],
         read: |view| Value::Number(if view.encoder.alarm() { POSITION_ERROR } else { 0 }),
         write: None,
@@ -383,7 +436,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Uint,
         source: Source::Reading,
         unit: "",
-        help: "Bit 0: position error supported.",
+        short_name: "Supported alarms",
+        help: "Bit 0 position error supported",
+        note: "",
+        changes: false,
         values: &[],
         read: |_| Value::Number(POSITION_ERROR),
         write: None,
@@ -396,7 +452,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Bool,
         source: Source::Reading,
         unit: "",
-        help: "An alarm signal is set: the position may be wrong.",
+        short_name: "Alarm flag",
+        help: "An alarm signal is set: the position may be wrong",
+        note: "",
+        changes: true,
         values: &["OK", "Alarm"],
         read: |view| Value::Number(i64::from(view.encoder.alarm())),
         write: None,
@@ -409,7 +468,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Uint,
         source: Source::Reading,
         unit: "",
-        help: "Bit 4: voltage of the lithium cell too low.",
+        short_name: "Warning messages",
+        help: "Bit 4 voltage of the lithium cell too low",
+        note: "",
+        changes: true,
         values: &[],
         read: |view| Value::Number(if view.encoder.warning() { CELL_VOLTAGE } else { 0 }),
         write: None,
@@ -422,7 +484,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Uint,
         source: Source::Reading,
         unit: "",
-        help: "Bit 4: voltage warning for the lithium cell supported.",
+        short_name: "Supp. warnings",
+        help: "Bit 4 lithium cell warning supported",
+        note: "",
+        changes: false,
         values: &[],
         read: |view| {
             Value::Number(if view.product.encoder.lithium_cell { CELL_VOLTAGE } else { 0 })
@@ -437,7 +502,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Bool,
         source: Source::Reading,
         unit: "",
-        help: "A warning message is set: the position is right all the same.",
+        short_name: "Warning flag",
+        help: "A warning message is set: the position is right all the same",
+        note: "",
+        changes: true,
         values: &["OK", "Warning"],
         read: |view| Value::Number(i64::from(view.encoder.warning())),
         write: None,
@@ -450,7 +518,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Udint,
         source: Source::Reading,
         unit: "",
-        help: "Low word: profile version; high word: software version; both BCD.",
+        short_name: "Profile/software",
+        help: "Low word profile version, high word software version, BCD",
+        note: "",
+        changes: false,
         values: &[],
         read: |_| Value::Number(PROFILE_AND_SOFTWARE),
         write: None,
@@ -462,8 +533,11 @@ pub static ROWS: [Row; 24] = [
         key: "offset",
         data_type: DataType::Dint,
         source: Source::Reading,
-        unit: "steps",
-        help: "What the preset function adds to the scaled position.",
+        unit: "step",
+        short_name: "Offset value",
+        help: "What the preset function adds to the scaled position",
+        note: "",
+        changes: true,
         values: &[],
         read: |view| Value::Number(i64::from(view.encoder.offset())),
         write: None,
@@ -476,7 +550,10 @@ pub static ROWS: [Row; 24] = [
         data_type: DataType::Uint,
         source: Source::Reading,
         unit: "",
-        help: "1: absolute encoder, singleturn. 2: absolute encoder, multiturn.",
+        short_name: "Encoder type",
+        help: "1 absolute singleturn encoder, 2 absolute multiturn encoder",
+        note: "",
+        changes: false,
         values: &["", "Singleturn", "Multiturn"],
         read: |view| Value::Number(i64::from(view.product.encoder_type())),
         write: None,
@@ -493,12 +570,15 @@ impl Row {
 
     /// Writes the value as the wire carries it.
     pub(crate) fn encode(&self, view: View<'_>, out: &mut Writer<'_>) -> Result<(), Full> {
-        match ((self.read)(view), self.data_type) {
-            (Value::Octets(octets), _) => out.octets(octets),
-            (Value::Number(value), data_type) => {
-                out.octets(value.to_le_bytes().get(..data_type.octets()).unwrap_or_default())
-            }
+        match (self.read)(view) {
+            Value::Octets(octets) => out.octets(octets),
+            Value::Number(value) => self.encode_number(value, out),
         }
+    }
+
+    /// Writes a number in the octets of the row's type.
+    pub(crate) fn encode_number(&self, value: i64, out: &mut Writer<'_>) -> Result<(), Full> {
+        out.octets(value.to_le_bytes().get(..self.data_type.octets()).unwrap_or_default())
     }
 
     /// Reads a value from the wire.
@@ -543,6 +623,17 @@ mod tests {
         let writable = ROWS.iter().filter(|row| row.write.is_some());
         let numbers: Vec<u8> = writable.map(|row| row.attribute).collect();
         assert_eq!(numbers, [3, 7, 8, 10, 11]);
+    }
+
+    #[test]
+    fn texts_fit_the_parameter_object() {
+        for row in &ROWS {
+            for (text, limit) in [(row.short_name, 16), (row.unit, 4), (row.help, 64)] {
+                assert!(text.len() <= limit, "{text}: {} of {limit}", text.len());
+                assert!(text.bytes().all(|octet| (b' '..=b'~').contains(&octet)), "{text}");
+            }
+            assert!(row.values.iter().all(|name| name.len() <= 16));
+        }
     }
 
     #[test]
