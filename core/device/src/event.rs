@@ -30,10 +30,7 @@ pub enum Event {
         attribute: u8,
     },
     /// A preset was executed.
-    Preset {
-        /// The position from now on.
-        value: u32,
-    },
+    Preset,
     /// The settings in force were saved.
     Saved,
     /// The saved settings were restored.
@@ -81,7 +78,7 @@ impl fmt::Display for Event {
             Self::CellLow => f.write_str("lithium cell: voltage too low"),
             Self::CellRight => f.write_str("lithium cell: voltage right again"),
             Self::SettingChanged { attribute } => write!(f, "2f/1/{attribute} changed"),
-            Self::Preset { value } => write!(f, "preset to {value}"),
+            Self::Preset => f.write_str("preset executed"),
             Self::Saved => f.write_str("settings saved"),
             Self::Restored => f.write_str("saved settings restored"),
             Self::Reset => f.write_str("reset to the defaults"),
@@ -105,28 +102,37 @@ const EVENTS: usize = 6;
 /// The last events, with a count of those lost.
 #[derive(Clone, Debug)]
 pub(crate) struct Events {
-    ring: [Option<(Instant, Event)>; EVENTS],
+    events: [Option<Event>; EVENTS],
+    /// When each of them happened; apart from them, since together they would take half as much
+    /// again.
+    times: [Instant; EVENTS],
     next: u8,
     lost: u32,
 }
 
 impl Events {
     pub(crate) const fn new() -> Self {
-        Self { ring: [None; EVENTS], next: 0, lost: 0 }
+        Self { events: [None; EVENTS], times: [Instant::ZERO; EVENTS], next: 0, lost: 0 }
     }
 
     pub(crate) fn push(&mut self, now: Instant, event: Event) {
-        let Some(place) = self.ring.get_mut(usize::from(self.next)) else { return };
-        if place.replace((now, event)).is_some() {
-            self.lost = self.lost.saturating_add(1);
+        let next = usize::from(self.next);
+        if let (Some(place), Some(time)) = (self.events.get_mut(next), self.times.get_mut(next)) {
+            *time = now;
+            if place.replace(event).is_some() {
+                self.lost = self.lost.saturating_add(1);
+            }
         }
         self.next = (self.next + 1) % EVENTS as u8;
     }
 
     /// The oldest event not yet fetched.
     pub(crate) fn take(&mut self) -> Option<(Instant, Event)> {
-        let (newer, older) = self.ring.split_at_mut_checked(usize::from(self.next))?;
-        older.iter_mut().chain(newer).find_map(Option::take)
+        let (newer, older) = self.events.split_at_mut_checked(usize::from(self.next))?;
+        let (newer_times, older_times) = self.times.split_at_checked(usize::from(self.next))?;
+        let older = older.iter_mut().zip(older_times);
+        let newer = newer.iter_mut().zip(newer_times);
+        older.chain(newer).find_map(|(event, time)| Some((*time, event.take()?)))
     }
 
     pub(crate) const fn lost(&self) -> u32 {

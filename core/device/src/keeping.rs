@@ -9,6 +9,9 @@ use codewheel_station::{Deadline, Duration, Instant};
 
 /// How long a Save waits for the memory.
 pub(crate) const KEEP_TIME: Duration = Duration::from_secs(5);
+/// How long an automatic write waits after one has failed, so that a dying memory is not worn out
+/// (decision).
+const RETRY_TIME: Duration = Duration::from_secs(60);
 
 /// What the memory said at power-up, and since.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,33 +20,56 @@ pub enum MemoryState {
     Fresh,
     /// A record is kept.
     Good,
-    /// Both records were damaged at power-up, and nothing has been saved since.
+    /// Both records were damaged at a power-up, and nothing has been saved since.
     Damaged,
 }
 
-/// A record on its way into memory.
+/// New saved settings on their way into memory.
 #[derive(Clone, Copy, Debug)]
-struct Writing {
-    saved: Block,
-    network: NetworkSettings,
-    reference: Option<Reference>,
-    consistency: u16,
-    /// Whether it carries a Save rather than an automatic write.
-    is_save: bool,
+struct Save {
+    /// What was in force when it was asked for.
+    block: Block,
+    /// Whether the network settings go back to their defaults with it.
+    resets_network: bool,
+    /// Whether its record has been handed out.
+    is_writing: bool,
 }
 
-/// Which settings a Save that has not been handed out yet is to write.
-///
-/// Until a Save is answered no request changes the settings, so what is in force when its record is
-/// handed out is what was in force when it was asked for.
+/// What is on its way into memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wanted {
-    /// No Save: the saved settings stay.
+enum Writing {
     Nothing,
-    /// Save: the settings in force become the saved ones.
-    InForce,
-    /// Reset of the Identity object, type 1: the defaults become the saved ones.
-    Defaults,
+    /// A record with the saved block as it is.
+    Automatic,
+    /// The record of the Save.
+    Save,
+}
+
+/// Where the shaft stood, in sixteen octets instead of the twenty-four of an `Option<Reference>`.
+#[derive(Clone, Copy, Debug)]
+struct KeptReference {
+    crossings: i64,
+    /// No code where there is no reference.
+    code: u32,
+}
+
+impl KeptReference {
+    const NO_CODE: u32 = u32::MAX;
+}
+
+impl From<Option<Reference>> for KeptReference {
+    fn from(reference: Option<Reference>) -> Self {
+        reference.map_or(Self { crossings: 0, code: Self::NO_CODE }, |reference| Self {
+            crossings: reference.crossings,
+            code: reference.code,
+        })
+    }
+}
+
+impl From<KeptReference> for Option<Reference> {
+    fn from(KeptReference { crossings, code }: KeptReference) -> Self {
+        (code != KeptReference::NO_CODE).then_some(Reference { crossings, code })
+    }
 }
 
 /// What is kept, what shall be, and what is on its way.
@@ -52,168 +78,273 @@ pub(crate) struct Keeping {
     /// The saved block, as it is in memory.
     pub(crate) saved: Block,
     /// The crossing reference, as it is in memory.
-    pub(crate) reference: Option<Reference>,
-    pub(crate) network: NetworkSettings,
-    pub(crate) memory: MemoryState,
+    reference: KeptReference,
+    /// The crossing reference of the record on its way.
+    written_reference: KeptReference,
+    /// A Save whose record is not yet in memory.
+    save: Option<Save>,
+    /// When the Save is answered as failed; never when nobody waits.
+    answer_by: Deadline,
+    /// Before this no automatic write is tried again.
+    retry_at: Deadline,
     pub(crate) writes: u32,
     pub(crate) consistency: u16,
-    /// The network settings as they shall be kept.
-    wanted_network: NetworkSettings,
-    wanted: Wanted,
+    /// The network settings, as they are in memory.
+    network: NetworkSettings,
+    /// The network settings of the record on its way.
+    written_network: NetworkSettings,
+    /// The network settings, as they shall be.
+    pub(crate) wanted_network: NetworkSettings,
+    pub(crate) memory: MemoryState,
+    writing: Writing,
+    /// An automatic write is wanted.
     due: bool,
-    writing: Option<Writing>,
-    /// When an unanswered Save is given up.
-    answer_by: Deadline,
 }
 
 /// What the end of a write means for the one who waits for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Answer {
-    /// Nobody waits.
-    Nobody,
-    Saved,
-    Failed,
+pub(crate) enum Outcome {
+    /// An automatic write, well or not.
+    Automatic,
+    /// The settings asked for are kept; whether somebody waits to hear it.
+    Saved {
+        /// Whether it is to be answered.
+        answer: bool,
+    },
+    /// They are not.
+    Failed {
+        /// Whether it is to be answered.
+        answer: bool,
+    },
 }
 
 impl Keeping {
     pub(crate) fn new(saved: Block, kept: Option<&Kept>, memory: MemoryState) -> Self {
-        let (network, consistency) =
-            kept.map_or((NetworkSettings::default(), 0), |kept| read_bus(&kept.bus));
+        let bus = kept.map_or_else(Bus::default, |kept| Bus::read(&kept.bus));
         Self {
             saved,
-            reference: kept.and_then(|kept| kept.reference),
-            network,
-            memory,
-            writes: kept.map_or(0, |kept| kept.writes),
-            consistency,
-            wanted_network: network,
-            wanted: Wanted::Nothing,
-            due: false,
-            writing: None,
+            reference: kept.and_then(|kept| kept.reference).into(),
+            written_reference: None.into(),
+            save: None,
             answer_by: Deadline::NEVER,
+            retry_at: Deadline::NEVER,
+            writes: kept.map_or(0, |kept| kept.writes),
+            consistency: bus.consistency,
+            network: bus.network,
+            written_network: bus.network,
+            wanted_network: bus.network,
+            memory: if bus.damaged { MemoryState::Damaged } else { memory },
+            writing: Writing::Nothing,
+            due: false,
         }
     }
 
-    /// Asks for an automatic write with what the memory holds now and a new crossing reference.
+    /// The crossing reference, as it is in memory.
+    pub(crate) fn reference(&self) -> Option<Reference> {
+        self.reference.into()
+    }
+
+    /// Asks for an automatic write with a new crossing reference.
     pub(crate) const fn refresh(&mut self) {
         self.due = true;
     }
 
-    /// Asks for an automatic write of `network`.
-    pub(crate) const fn keep_network(&mut self, network: NetworkSettings) {
+    /// Asks for an automatic write of `network`, unless that is what is kept or on its way.
+    pub(crate) fn keep_network(&mut self, network: NetworkSettings) {
         self.wanted_network = network;
-        self.due = true;
+        let coming = if self.is_writing() { self.written_network } else { self.network };
+        self.due |= network != coming;
     }
 
-    /// Asks for new saved settings, and for an answer.
-    pub(crate) fn save(&mut self, now: Instant, wanted: Wanted) {
-        self.wanted = wanted;
-        self.due = true;
+    /// Asks for new saved settings, and for an answer; `false` while the record of an earlier Save
+    /// is on its way.
+    pub(crate) fn save(&mut self, now: Instant, block: Block, resets_network: bool) -> bool {
+        if self.save.is_some_and(|save| save.is_writing) {
+            return false;
+        }
+        self.save = Some(Save { block, resets_network, is_writing: false });
         self.answer_by = Deadline::at(now + KEEP_TIME);
+        true
     }
 
     /// Whether a record is on its way into memory.
-    pub(crate) const fn is_writing(&self) -> bool {
-        self.writing.is_some()
+    pub(crate) fn is_writing(&self) -> bool {
+        self.writing != Writing::Nothing
     }
 
-    /// Whether a record waits to be handed out.
-    pub(crate) const fn is_due(&self) -> bool {
-        self.due && self.writing.is_none()
+    /// Whether a record can be handed out at `now`.
+    pub(crate) fn is_due(&self, now: Instant) -> bool {
+        let retry = self.retry_at.is_never() || self.retry_at.is_due(now);
+        !self.is_writing() && (self.save.is_some() || self.due && retry)
+    }
+
+    /// Whether nothing is to be written, but for an automatic write that has failed.
+    pub(crate) fn is_idle(&self) -> bool {
+        let waits_to_retry = self.due && !self.retry_at.is_never();
+        !self.is_writing() && self.save.is_none() && (!self.due || waits_to_retry)
     }
 
     /// The record to write next. A block that needs a crossing reference gets the one of now.
     pub(crate) fn next(
         &mut self,
+        now: Instant,
         fingerprint: u16,
         serial: u32,
         encoder: &Encoder,
     ) -> Option<Kept> {
-        if !self.is_due() {
+        if !self.is_due(now) {
             return None;
         }
         self.due = false;
-        let is_save = self.wanted != Wanted::Nothing;
-        let saved = match core::mem::replace(&mut self.wanted, Wanted::Nothing) {
-            Wanted::Nothing => self.saved,
-            Wanted::InForce => encoder.block(),
-            Wanted::Defaults => encoder.default_block(),
+        self.retry_at = Deadline::NEVER;
+        let (saved, network) = match &mut self.save {
+            Some(save) => {
+                save.is_writing = true;
+                self.writing = Writing::Save;
+                let reset = save.resets_network;
+                (save.block, if reset { NetworkSettings::default() } else { self.wanted_network })
+            }
+            None => {
+                self.writing = Writing::Automatic;
+                (self.saved, self.wanted_network)
+            }
         };
-        let network = self.wanted_network;
-        let changed = saved != self.saved || network != self.network;
-        let consistency = if changed { self.consistency.wrapping_add(1) } else { self.consistency };
-        self.writes = self.writes.saturating_add(1);
         let needed = saved.needs_reference(encoder.model());
         let reference = if needed { encoder.reference() } else { None };
-        self.writing = Some(Writing { saved, network, reference, consistency, is_save });
-        let bus = write_bus(network, consistency);
-        Some(Kept { fingerprint, saved, reference, serial, writes: self.writes, bus })
+        self.written_reference = reference.into();
+        self.written_network = network;
+        let bus = Bus {
+            network,
+            consistency: self.consistency_of(&saved),
+            // Only a Save ends the mark that both records were damaged once.
+            damaged: self.memory == MemoryState::Damaged && self.writing == Writing::Automatic,
+        };
+        let writes = self.writes.saturating_add(1);
+        Some(Kept { fingerprint, saved, reference, serial, writes, bus: bus.write() })
+    }
+
+    /// The configuration consistency value with `saved` and the network settings on their way:
+    /// another one when kept settings change.
+    fn consistency_of(&self, saved: &Block) -> u16 {
+        let changed = *saved != self.saved || self.written_network != self.network;
+        if changed { self.consistency.wrapping_add(1) } else { self.consistency }
     }
 
     /// The write handed out last has ended.
-    pub(crate) fn kept(&mut self, good: bool) -> Answer {
-        let Some(writing) = self.writing.take() else { return Answer::Nobody };
+    pub(crate) fn kept(&mut self, now: Instant, good: bool) -> Outcome {
+        let writing = core::mem::replace(&mut self.writing, Writing::Nothing);
+        let save = match writing {
+            Writing::Nothing => return Outcome::Automatic,
+            Writing::Automatic => None,
+            Writing::Save => self.save.take(),
+        };
         if good {
-            self.saved = writing.saved;
-            self.network = writing.network;
-            self.reference = writing.reference;
-            self.consistency = writing.consistency;
-            if self.memory == MemoryState::Fresh || writing.is_save {
+            let saved = save.map_or(self.saved, |save| save.block);
+            self.consistency = self.consistency_of(&saved);
+            self.saved = saved;
+            self.reference = self.written_reference;
+            self.network = self.written_network;
+            self.writes = self.writes.saturating_add(1);
+            if self.memory == MemoryState::Fresh || save.is_some() {
                 self.memory = MemoryState::Good;
             }
+            if save.is_some_and(|save| save.resets_network) {
+                self.wanted_network = self.network;
+            }
+        } else if save.is_none() || self.wanted_network != self.network {
+            // What was to be kept at once still is.
+            self.due = true;
+            self.retry_at = Deadline::at(now + RETRY_TIME);
         }
-        if !writing.is_save || self.answer_by == Deadline::NEVER {
-            return Answer::Nobody;
+        if save.is_none() {
+            return Outcome::Automatic;
         }
+        // A Save that was answered as failed, because it took too long, is not answered again.
+        let answer = !self.answer_by.is_never();
         self.answer_by = Deadline::NEVER;
-        if good { Answer::Saved } else { Answer::Failed }
+        if good { Outcome::Saved { answer } } else { Outcome::Failed { answer } }
     }
 
-    /// Whether a Save has waited for too long; then it is to be answered as failed, and is off
-    /// where its record has not even been fetched.
+    /// Whether the newest Save has waited for too long; then it is to be answered as failed, and is
+    /// off where its record has not even been fetched.
     pub(crate) fn overdue(&mut self, now: Instant) -> bool {
         let overdue = self.answer_by.take_due(now);
-        if overdue {
-            self.wanted = Wanted::Nothing;
+        if overdue && self.writing != Writing::Save {
+            self.save = None;
         }
         overdue
     }
 
-    pub(crate) const fn deadline(&self) -> Deadline {
-        self.answer_by
+    pub(crate) fn deadline(&self) -> Deadline {
+        let retry = if self.due { self.retry_at } else { Deadline::NEVER };
+        self.answer_by.min(retry)
     }
 }
 
-/// The layout of the record's octets that belong to the bus: its version, then what
-/// [`NetworkSettings`] has and the configuration consistency value.
+/// The octets of the record that belong to the bus.
+///
+/// | octet | content |
+/// |---|---|
+/// | 0 | version, 1 |
+/// | 1 | bit 0 bus-off interrupt, bit 1 both records were damaged and nothing has been saved since |
+/// | 2 … 3 | configuration consistency value |
+/// | 4 … 5 | poll connection: assembly, whether its path names the attribute |
+/// | 6 … 7 | change of state connection: the same |
+/// | 8 | heartbeat interval in seconds |
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Bus {
+    network: NetworkSettings,
+    consistency: u16,
+    damaged: bool,
+}
+
 const BUS_VERSION: u8 = 1;
+const BUS_OFF_INTERRUPT: u8 = 1 << 0;
+const DAMAGED: u8 = 1 << 1;
 
-fn write_bus(network: NetworkSettings, consistency: u16) -> [u8; 24] {
-    let mut octets = [0; 24];
-    let [low, high] = consistency.to_le_bytes();
-    let path = network.poll_path;
-    let content = [
-        BUS_VERSION,
-        u8::from(network.bus_off_interrupt),
-        low,
-        high,
-        path.assembly,
-        u8::from(path.names_attribute),
-    ];
-    for (to, from) in octets.iter_mut().zip(content) {
-        *to = from;
+impl Bus {
+    fn write(self) -> [u8; 24] {
+        let Self { network, consistency, damaged } = self;
+        let NetworkSettings { bus_off_interrupt, heartbeat_interval, poll_path, change_path } =
+            network;
+        let interrupt = if bus_off_interrupt { BUS_OFF_INTERRUPT } else { 0 };
+        let [low, high] = consistency.to_le_bytes();
+        let content = [
+            BUS_VERSION,
+            interrupt | if damaged { DAMAGED } else { 0 },
+            low,
+            high,
+            poll_path.assembly,
+            u8::from(poll_path.names_attribute),
+            change_path.assembly,
+            u8::from(change_path.names_attribute),
+            heartbeat_interval,
+        ];
+        let mut octets = [0; 24];
+        for (to, from) in octets.iter_mut().zip(content) {
+            *to = from;
+        }
+        octets
     }
-    octets
-}
 
-fn read_bus(octets: &[u8; 24]) -> (NetworkSettings, u16) {
-    let [version, bus_off_interrupt, low, high, assembly, names_attribute, ..] = *octets;
-    if version != BUS_VERSION {
-        return (NetworkSettings::default(), 0);
+    fn read(octets: &[u8; 24]) -> Self {
+        let [version, flags, low, high, poll, poll_long, change, change_long, heartbeat, ..] =
+            *octets;
+        if version != BUS_VERSION {
+            return Self::default();
+        }
+        let path = |assembly, long| ProducedPath { assembly, names_attribute: long != 0 };
+        Self {
+            network: NetworkSettings {
+                bus_off_interrupt: flags & BUS_OFF_INTERRUPT != 0,
+                heartbeat_interval: heartbeat,
+                poll_path: path(poll, poll_long),
+                change_path: path(change, change_long),
+            },
+            consistency: u16::from_le_bytes([low, high]),
+            damaged: flags & DAMAGED != 0,
+        }
     }
-    let poll_path = ProducedPath { assembly, names_attribute: names_attribute != 0 };
-    let network = NetworkSettings { bus_off_interrupt: bus_off_interrupt != 0, poll_path };
-    (network, u16::from_le_bytes([low, high]))
 }
 
 #[cfg(test)]
@@ -222,9 +353,16 @@ mod tests {
 
     #[test]
     fn the_octets_of_the_bus_read_back_as_written() {
-        let poll_path = ProducedPath { assembly: 2, names_attribute: true };
-        let network = NetworkSettings { bus_off_interrupt: true, poll_path };
-        assert_eq!(read_bus(&write_bus(network, 0xBEEF)), (network, 0xBEEF));
-        assert_eq!(read_bus(&[0; 24]), (NetworkSettings::default(), 0));
+        let network = NetworkSettings {
+            bus_off_interrupt: true,
+            heartbeat_interval: 200,
+            poll_path: ProducedPath { assembly: 2, names_attribute: true },
+            change_path: ProducedPath { assembly: 1, names_attribute: true },
+        };
+        for damaged in [false, true] {
+            let bus = Bus { network, consistency: 0xBEEF, damaged };
+            assert_eq!(Bus::read(&bus.write()), bus);
+        }
+        assert_eq!(Bus::read(&[0; 24]), Bus::default());
     }
 }

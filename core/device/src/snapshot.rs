@@ -41,6 +41,8 @@ pub struct Snapshot {
     pub explicit: Option<State>,
     /// The state of the poll connection, if it exists.
     pub poll: Option<State>,
+    /// The state of the change of state or cyclic connection, if it exists.
+    pub change_of_state: Option<State>,
     /// What the memory holds.
     pub memory: MemoryState,
     /// How often the memory has been written.

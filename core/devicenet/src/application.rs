@@ -1,5 +1,6 @@
 //! What a device brings to the stack: its identity, its assemblies, its own objects.
 
+use codewheel_station::can::BitRate;
 use codewheel_station::{Instant, Writer};
 
 use crate::explicit::{Error, Path, Service};
@@ -57,8 +58,8 @@ pub enum Reset {
 pub struct SwitchPositions {
     /// The address switches, 0 … 99.
     pub mac: u8,
-    /// The bit rate switches: 0 = 125k, 1 = 250k, 2 = 500k.
-    pub bit_rate: u8,
+    /// The bit rate switches.
+    pub bit_rate: BitRate,
 }
 
 /// What the network part of a device keeps through a power cut.
@@ -67,8 +68,12 @@ pub struct NetworkSettings {
     /// DeviceNet object attribute 3, bus-off interrupt: false = stay off, true = reset the
     /// controller and check the MAC ID again.
     pub bus_off_interrupt: bool,
+    /// Identity attribute 10, heartbeat interval in seconds; 0 = no heartbeat.
+    pub heartbeat_interval: u8,
     /// Connection instance 2 attribute 14, where poll responses come from.
     pub poll_path: ProducedPath,
+    /// Connection instance 4 attribute 14, where change of state and cyclic data come from.
+    pub change_path: ProducedPath,
 }
 
 /// The device behind a [`Server`](crate::Server), lent to it for one call at a time.
@@ -99,8 +104,25 @@ pub trait Application {
     /// built, for an `instance` that [`assembly_size`](Application::assembly_size) knows.
     fn produce(&mut self, now: Instant, instance: u8, octets: &mut [u8; 8]) -> usize;
 
-    /// The class `class`, or `None` where the device has none. The stack's own classes 01 … 05
-    /// are not asked for.
+    /// The highest instance number of the assemblies, class 04 attribute 2.
+    fn highest_assembly(&self) -> u8;
+
+    /// Whether assembly `instance` has changed enough since its last
+    /// [`change_produced`](Application::change_produced) that a change of state connection shall
+    /// produce it. Asked often while such a connection is established.
+    fn has_changed(&mut self, instance: u8) -> bool {
+        let _ = instance;
+        false
+    }
+
+    /// Assembly `instance` was produced by the change of state or cyclic connection just now:
+    /// changes count from here.
+    fn change_produced(&mut self, instance: u8) {
+        let _ = instance;
+    }
+
+    /// The class `class`, or `None` where the device has none. The stack's own classes 01 … 05 and
+    /// 2B are not asked for.
     fn class(&self, class: u8) -> Option<Class>;
 
     /// Writes the value of an attribute (Get_Attribute_Single).

@@ -8,6 +8,8 @@ use crate::explicit::{Error, GeneralStatus, class};
 pub const EXPLICIT: u8 = 1;
 /// Instance number of the poll connection.
 pub const POLL: u8 = 2;
+/// Instance number of the change of state or cyclic connection.
+pub const CHANGE_OF_STATE: u8 = 4;
 
 /// The state of a connection (attribute 1). A connection that does not exist has none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +47,8 @@ pub struct Connection {
     pub watchdog_action: u8,
     /// Attribute 17, production inhibit time in ms; 0 = none.
     pub production_inhibit: u16,
+    /// Whether anything is consumed at all; without, nothing can be missed and nothing times out.
+    pub(crate) consumes: bool,
     /// When the connection times out unless something arrives.
     inactive_at: Deadline,
 }
@@ -67,6 +71,7 @@ impl Connection {
             expected_packet_rate: 2500,
             watchdog_action: Self::AUTO_DELETE,
             production_inhibit: 0,
+            consumes: true,
             inactive_at: Deadline::NEVER,
         };
         connection.arm(now);
@@ -81,6 +86,7 @@ impl Connection {
             expected_packet_rate: 0,
             watchdog_action: Self::TRANSITION_TO_TIMED_OUT,
             production_inhibit: 0,
+            consumes: true,
             inactive_at: Deadline::NEVER,
         }
     }
@@ -93,15 +99,20 @@ impl Connection {
 
     /// Something arrived on the connection: the inactivity timer begins anew.
     pub fn arm(&mut self, now: Instant) {
-        self.inactive_at = inactivity_time(self.expected_packet_rate)
-            .map_or(Deadline::NEVER, |time| Deadline::at(now + time));
+        self.inactive_at = self.inactive_after(now, Duration::ZERO);
     }
 
     /// From configuring to established; the first interval is the pre-consumption time.
     pub fn establish(&mut self, now: Instant) {
         self.state = State::Established;
-        self.inactive_at = inactivity_time(self.expected_packet_rate)
-            .map_or(Deadline::NEVER, |time| Deadline::at(now + time.max(PRE_CONSUMPTION_TIME)));
+        self.inactive_at = self.inactive_after(now, PRE_CONSUMPTION_TIME);
+    }
+
+    fn inactive_after(&self, now: Instant, least: Duration) -> Deadline {
+        match inactivity_time(self.expected_packet_rate) {
+            Some(time) if self.consumes => Deadline::at(now + time.max(least)),
+            _ => Deadline::NEVER,
+        }
     }
 
     /// Stops the inactivity timer.

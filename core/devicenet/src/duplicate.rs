@@ -112,8 +112,12 @@ impl DuplicateMacCheck {
         }
     }
 
-    /// Falls silent for good.
+    /// Falls silent for good. A fault that there is already stays: a node without an address of its
+    /// own must not come back because its controller left the bus as well.
     pub const fn fault(&mut self, fault: Fault) {
+        if matches!(self.phase, Phase::Faulted(Fault::DuplicateMac | Fault::Switches)) {
+            return;
+        }
         self.phase = Phase::Faulted(fault);
         self.answer_owed = false;
         self.listens_until = Deadline::NEVER;

@@ -72,6 +72,8 @@ impl Service {
     pub const RESTORE: Self = Self(0x15);
     /// Save.
     pub const SAVE: Self = Self(0x16);
+    /// Get_Enum_String, on class 0F; the same code as Allocate on class 03.
+    pub const GET_ENUM_STRING: Self = Self(0x4B);
     /// Allocate_Master/Slave_Connection_Set, on class 03.
     pub const ALLOCATE: Self = Self(0x4B);
     /// Release_Master/Slave_Connection_Set, on class 03.
@@ -192,6 +194,8 @@ pub mod class {
     pub const ASSEMBLY: u8 = 0x04;
     /// Connection.
     pub const CONNECTION: u8 = 0x05;
+    /// Acknowledge Handler.
+    pub const ACKNOWLEDGE_HANDLER: u8 = 0x2B;
 }
 
 /// Names one attribute: class, instance (0 = the class itself), attribute.

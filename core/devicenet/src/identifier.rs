@@ -10,8 +10,13 @@
 
 use crate::MacId;
 
+/// Group 1 message 13: a slave's change of state or cyclic production.
+pub const CHANGE_OF_STATE_MESSAGE: u8 = 13;
 /// Group 1 message 15: a slave's poll response, or its acknowledge of a master's change of state.
 pub const POLL_RESPONSE: u8 = 15;
+/// Group 2 message 2: the master's acknowledge of a change of state or cyclic production; the MAC
+/// ID is the destination.
+pub const CHANGE_ACKNOWLEDGE: u8 = 2;
 /// Group 2 message 3: the slave's explicit or unconnected response; the MAC ID is the source.
 pub const EXPLICIT_RESPONSE: u8 = 3;
 /// Group 2 message 4: the master's explicit request; the MAC ID is the destination.

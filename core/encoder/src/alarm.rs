@@ -1,6 +1,6 @@
 //! The position error: a code that moved further than any shaft turns.
 
-use codewheel_station::{Duration, Instant};
+use codewheel_station::{Deadline, Duration, Instant};
 
 /// How long an alarm stays after its last event: 2.5 s (DeviceNet manual §8, "Alarm signals").
 pub const ALARM_TIME: Duration = Duration::from_millis(2_500);
@@ -25,13 +25,13 @@ pub(crate) struct PositionError {
     /// The speed limit in raw steps per minute.
     limit: u64,
     /// When the alarm ends, while there is one.
-    until: Option<Instant>,
+    until: Deadline,
 }
 
 impl PositionError {
     /// No alarm; the limit is `rpm` on a disc of `singleturn_resolution` steps.
     pub(crate) fn new(rpm: u32, singleturn_resolution: u32) -> Self {
-        let mut error = Self { limit: 0, until: None };
+        let mut error = Self { limit: 0, until: Deadline::NEVER };
         error.set_limit(rpm, singleturn_resolution);
         error
     }
@@ -49,22 +49,20 @@ impl PositionError {
         let took = u64::from(moved).saturating_mul(MINUTE.as_nanos());
         if took > self.limit.saturating_mul(elapsed.as_nanos()) {
             // Decision: "extended by 2.5 s" means that every event starts the time anew.
-            self.until = Some(now + ALARM_TIME);
+            self.until = Deadline::at(now + ALARM_TIME);
         }
     }
 
     /// Ends the alarm once its time is over.
     pub(crate) fn advance(&mut self, now: Instant) {
-        if self.until.is_some_and(|until| now >= until) {
-            self.until = None;
-        }
+        self.until.take_due(now);
     }
 
     pub(crate) const fn is_on(&self) -> bool {
-        self.until.is_some()
+        !self.until.is_never()
     }
 
     pub(crate) const fn deadline(&self) -> Option<Instant> {
-        self.until
+        self.until.instant()
     }
 }

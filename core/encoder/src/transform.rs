@@ -27,7 +27,7 @@ pub(crate) struct Transform {
     /// What makes the shift round: 0 down, S−1 up.
     rounding: u32,
     /// log₂ S.
-    shift: u32,
+    shift: u8,
     direction: Direction,
 }
 
@@ -46,7 +46,7 @@ impl Transform {
                 Direction::Cw => 0,
                 Direction::Ccw => singleturn_resolution - 1,
             },
-            shift: singleturn_resolution.trailing_zeros(),
+            shift: singleturn_resolution.trailing_zeros() as u8,
             direction: settings.direction,
         };
         transform.rebase(crossings, offset);

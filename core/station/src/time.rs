@@ -98,6 +98,7 @@ impl Deadline {
     }
 
     /// Whether it has been reached.
+    #[inline]
     #[must_use]
     pub const fn is_due(self, now: Instant) -> bool {
         !self.is_never() && self.0.0 <= now.0
@@ -122,6 +123,7 @@ impl Deadline {
     }
 
     /// Takes the deadline away where it has been reached, and says whether it has.
+    #[inline]
     pub fn take_due(&mut self, now: Instant) -> bool {
         let due = self.is_due(now);
         if due {
@@ -139,12 +141,14 @@ impl Default for Deadline {
 }
 
 impl From<Option<Instant>> for Deadline {
+    #[inline]
     fn from(instant: Option<Instant>) -> Self {
         instant.map_or(Self::NEVER, Self)
     }
 }
 
 /// The earlier of two deadlines, where `None` means never.
+#[inline]
 #[must_use]
 pub fn earlier(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
     match (a, b) {

@@ -43,7 +43,7 @@ fn encoder(input: &[u8], sum: &mut Sum) {
     let mut device =
         DeviceNetEncoder::power_up(Instant::ZERO, product, factory, switches, &start, sensor);
     let now = run(&mut device, Instant::ZERO, input, sum, |device, now| {
-        if let Some(kept) = device.keep() {
+        if let Some(kept) = device.keep(now) {
             let [a, _] = &mut slots;
             *a = encode(&kept, sequence);
             sequence = sequence.wrapping_add(1);

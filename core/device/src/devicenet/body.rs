@@ -6,13 +6,13 @@ use codewheel_devicenet::{
     SwitchPositions,
 };
 use codewheel_encoder::{Block, Encoder, Sensor, Start};
-use codewheel_station::can::BitRate;
 use codewheel_station::{Deadline, Duration, Instant, Writer};
 
 use super::Factory;
-use super::rows::{ENCODER_POSITION, Row, View};
+use super::parameter::{self, PARAMETER};
+use super::rows::{ENCODER_POSITION, PRESET, Row, View};
 use crate::event::{Event, Events};
-use crate::keeping::{Keeping, MemoryState, Wanted};
+use crate::keeping::{Keeping, MemoryState};
 use crate::{Product, Switches};
 
 /// How often a moving shaft is looked at between productions.
@@ -40,6 +40,14 @@ pub(super) struct Body<S> {
     pub(super) powered_at: Instant,
     /// When the shaft must be looked at; never while it rests.
     pub(super) next_sample: Deadline,
+    /// When a reset that waits for the memory happens all the same.
+    pub(super) restart_by: Deadline,
+    /// The unwrapped position that the change of state connection produced last.
+    produced: i64,
+    /// The flags it produced last.
+    produced_flags: u8,
+    /// A preset or a change of settings is to be produced, however little the position moved.
+    produce_anyway: bool,
 }
 
 impl<S: Sensor> Body<S> {
@@ -72,7 +80,7 @@ impl<S: Sensor> Body<S> {
             }
         };
         let encoder =
-            Encoder::power_up(model, keeping.saved, keeping.reference).unwrap_or_else(|_| {
+            Encoder::power_up(model, keeping.saved, keeping.reference()).unwrap_or_else(|_| {
                 keeping = Keeping::new(defaults, None, MemoryState::Damaged);
                 Encoder::with_defaults(model)
             });
@@ -90,6 +98,10 @@ impl<S: Sensor> Body<S> {
             events,
             powered_at: now,
             next_sample: Deadline::NEVER,
+            restart_by: Deadline::NEVER,
+            produced: 0,
+            produced_flags: 0,
+            produce_anyway: true,
         };
         body.wake(now);
         body
@@ -98,6 +110,7 @@ impl<S: Sensor> Body<S> {
     /// What every power-up does: read the switches, look at the shaft.
     fn wake(&mut self, now: Instant) {
         self.powered_at = now;
+        self.restart_by = Deadline::NEVER;
         self.mac = self.switches.mac();
         self.events.push(now, Event::PowerUp);
         if self.mac.is_none() {
@@ -109,8 +122,9 @@ impl<S: Sensor> Body<S> {
     /// The power is cycled: what is kept is in force again.
     pub(super) fn restart(&mut self, now: Instant) {
         let model = self.product.encoder;
-        self.encoder = Encoder::power_up(model, self.keeping.saved, self.keeping.reference)
+        self.encoder = Encoder::power_up(model, self.keeping.saved, self.keeping.reference())
             .unwrap_or_else(|_| Encoder::with_defaults(model));
+        self.produce_anyway = true;
         self.wake(now);
     }
 
@@ -118,8 +132,8 @@ impl<S: Sensor> Body<S> {
     pub(super) fn server(&self) -> Server {
         let bit_rate = self.switches.bit_rate();
         match self.mac {
-            Some(mac) => Server::new(mac, bit_rate, self.keeping.network),
-            None => Server::off_the_bus(bit_rate, self.keeping.network),
+            Some(mac) => Server::new(mac, bit_rate, self.keeping.wanted_network),
+            None => Server::off_the_bus(bit_rate, self.keeping.wanted_network),
         }
     }
 
@@ -134,9 +148,9 @@ impl<S: Sensor> Body<S> {
         if (alarm, warning) != (self.encoder.alarm(), self.encoder.warning()) {
             self.flags_changed(now, alarm, warning);
         }
-        if let Some(reference) = &self.keeping.reference
+        if let Some(reference) = self.keeping.reference()
             && !self.keeping.is_writing()
-            && self.encoder.reference_is_stale(reference)
+            && self.encoder.reference_is_stale(&reference)
         {
             self.keeping.refresh();
         }
@@ -174,20 +188,45 @@ impl<S: Sensor> Body<S> {
 
     pub(super) fn deadline(&self) -> Deadline {
         let flags = Deadline::from(self.encoder.deadline());
-        flags.min(self.keeping.deadline()).min(self.next_sample)
+        flags.min(self.keeping.deadline()).min(self.next_sample).min(self.restart_by)
+    }
+
+    /// The flags of assembly 2.
+    fn flags(&self) -> u8 {
+        let alarm = if self.encoder.alarm() { ALARM_FLAG } else { 0 };
+        let warning = if self.encoder.warning() { WARNING_FLAG } else { 0 };
+        alarm | warning
     }
 
     fn view(&self) -> View<'_> {
         View { product: self.product, encoder: &self.encoder }
     }
 
+    /// The services of one parameter. Save, Restore and Reset are for all parameters together, at
+    /// class level (decision: the conformance test wants 08 at an instance).
+    fn parameter_service(
+        &mut self,
+        now: Instant,
+        request: Request<'_>,
+        out: &mut Writer<'_>,
+    ) -> Result<Done, Error> {
+        let row = parameter::row(request.instance)?;
+        match request.service {
+            Service::GET_ATTRIBUTES_ALL => {
+                expect_nothing(request.data)?;
+                self.sample(now);
+                parameter::all_attributes(row, self.view(), out)?;
+            }
+            Service::GET_ENUM_STRING => parameter::enum_string(row, request.data, out)?,
+            _ => return Err(GeneralStatus::SERVICE_NOT_SUPPORTED.into()),
+        }
+        Ok(Done::Now)
+    }
+
     /// Save, Restore and Reset of class 2Fh.
     fn memory_service(&mut self, now: Instant, service: Service) -> Result<Done, Error> {
         match service {
-            Service::SAVE => {
-                self.keeping.save(now, Wanted::InForce);
-                Ok(Done::Later)
-            }
+            Service::SAVE => self.save(now, self.encoder.block(), false),
             Service::RESTORE => {
                 if self.keeping.memory == MemoryState::Damaged {
                     return Err(GeneralStatus::NO_STORED_DATA.into());
@@ -205,7 +244,18 @@ impl<S: Sensor> Body<S> {
         }
     }
 
+    /// New saved settings. The record of an earlier Save whose connection has ended may still be on
+    /// its way into memory; then this one has to be asked for again.
+    fn save(&mut self, now: Instant, block: Block, resets_network: bool) -> Result<Done, Error> {
+        if self.keeping.save(now, block, resets_network) {
+            Ok(Done::Later)
+        } else {
+            Err(GeneralStatus::DEVICE_STATE_CONFLICT.into())
+        }
+    }
+
     fn load(&mut self, block: Block) -> Result<(), Error> {
+        self.produce_anyway = true;
         self.encoder.load(block).map_err(|_| GeneralStatus::NO_STORED_DATA.into())
     }
 }
@@ -238,12 +288,7 @@ impl<S: Sensor> Application for Body<S> {
     }
 
     fn switches(&self) -> SwitchPositions {
-        let bit_rate = match self.switches.bit_rate() {
-            BitRate::Kbit125 => 0,
-            BitRate::Kbit250 => 1,
-            BitRate::Kbit500 => 2,
-        };
-        SwitchPositions { mac: self.switches.address(), bit_rate }
+        SwitchPositions { mac: self.switches.address(), bit_rate: self.switches.bit_rate() }
     }
 
     fn assembly_size(&self, instance: u8) -> Option<usize> {
@@ -261,31 +306,74 @@ impl<S: Sensor> Application for Body<S> {
         if instance != 2 {
             return 4;
         }
-        *flags = if self.encoder.alarm() { ALARM_FLAG } else { 0 }
-            | if self.encoder.warning() { WARNING_FLAG } else { 0 };
+        *flags = self.flags();
         5
     }
 
+    fn highest_assembly(&self) -> u8 {
+        2
+    }
+
+    /// The COS delta is judged on the unwrapped position, so that one above half the range works
+    /// too; the flags count where they are produced.
+    fn has_changed(&mut self, instance: u8) -> bool {
+        let moved = self.encoder.unwrapped().abs_diff(self.produced);
+        self.produce_anyway
+            || moved >= u64::from(self.encoder.cos_delta())
+            || instance == 2 && self.produced_flags != self.flags()
+    }
+
+    fn change_produced(&mut self, _instance: u8) {
+        self.produced = self.encoder.unwrapped();
+        self.produced_flags = self.flags();
+        self.produce_anyway = false;
+    }
+
     fn class(&self, class: u8) -> Option<Class> {
-        (class == ENCODER_POSITION).then_some(Class { revision: 1, max_instance: 1 })
+        let max_instance = match class {
+            ENCODER_POSITION => 1,
+            PARAMETER => parameter::LINKS.len() as u16,
+            _ => return None,
+        };
+        Some(Class { revision: 1, max_instance })
     }
 
     fn get(&mut self, now: Instant, path: Path, out: &mut Writer<'_>) -> Result<(), Error> {
+        if path.class == PARAMETER {
+            if path.instance == 0 {
+                return parameter::class_attribute(path.attribute, out);
+            }
+            let row = parameter::row(path.instance)?;
+            self.sample(now);
+            return parameter::attribute(row, path.attribute, self.view(), out);
+        }
         let row = row(path)?;
         self.sample(now);
         row.encode(self.view(), out).map_err(|_| GeneralStatus::RESOURCE_UNAVAILABLE.into())
     }
 
     fn set(&mut self, now: Instant, path: Path, data: &[u8]) -> Result<Done, Error> {
-        let row = row(path)?;
+        let row = if path.class == PARAMETER {
+            let row = parameter::row(path.instance)?;
+            match path.attribute {
+                parameter::VALUE => row,
+                2..=parameter::LAST_ATTRIBUTE => {
+                    return Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE.into());
+                }
+                _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED.into()),
+            }
+        } else {
+            row(path)?
+        };
         let write = row.write.ok_or(Error::from(GeneralStatus::ATTRIBUTE_NOT_SETTABLE))?;
         let value = row.decode(data)?;
         // A preset takes effect at the position of this very moment.
         self.sample(now);
         let changed = write(&mut self.encoder, value)
             .map_err(|_| Error::from(GeneralStatus::INVALID_ATTRIBUTE_VALUE))?;
-        if row.key == "preset" {
-            self.events.push(now, Event::Preset { value: self.encoder.preset() });
+        self.produce_anyway |= changed;
+        if row.attribute == PRESET {
+            self.events.push(now, Event::Preset);
         } else if changed {
             self.events.push(now, Event::SettingChanged { attribute: row.attribute });
         }
@@ -296,14 +384,21 @@ impl<S: Sensor> Application for Body<S> {
         &mut self,
         now: Instant,
         request: Request<'_>,
-        _out: &mut Writer<'_>,
+        out: &mut Writer<'_>,
     ) -> Result<Done, Error> {
+        if request.class == PARAMETER && request.instance != 0 {
+            return self.parameter_service(now, request, out);
+        }
         if request.instance > 1 {
             return Err(GeneralStatus::OBJECT_DOES_NOT_EXIST.into());
         }
+        if request.class == PARAMETER && request.service == Service::GET_ATTRIBUTES_ALL {
+            expect_nothing(request.data)?;
+            return parameter::all_class_attributes(out).map(|()| Done::Now);
+        }
         let known = [Service::SAVE, Service::RESTORE, Service::RESET].contains(&request.service);
-        if known && !request.data.is_empty() {
-            return Err(GeneralStatus::TOO_MUCH_DATA.into());
+        if known {
+            expect_nothing(request.data)?;
         }
         self.sample(now);
         self.memory_service(now, request.service)
@@ -312,11 +407,7 @@ impl<S: Sensor> Application for Body<S> {
     fn reset(&mut self, now: Instant, reset: Reset) -> Result<Done, Error> {
         match reset {
             Reset::PowerCycle => Ok(Done::Now),
-            Reset::Defaults => {
-                self.keeping.keep_network(NetworkSettings::default());
-                self.keeping.save(now, Wanted::Defaults);
-                Ok(Done::Later)
-            }
+            Reset::Defaults => self.save(now, self.encoder.default_block(), true),
         }
     }
 
@@ -327,6 +418,11 @@ impl<S: Sensor> Application for Body<S> {
     fn notice(&mut self, now: Instant, event: codewheel_devicenet::Event) {
         self.events.push(now, Event::Network(event));
     }
+}
+
+/// Services that take no data refuse some.
+fn expect_nothing(data: &[u8]) -> Result<(), Error> {
+    if data.is_empty() { Ok(()) } else { Err(GeneralStatus::TOO_MUCH_DATA.into()) }
 }
 
 /// The row that `path` names.

@@ -1,6 +1,7 @@
 //! An encoder on DeviceNet: the server of the bus and the encoder, tied by the rows.
 
 mod body;
+pub mod parameter;
 pub mod rows;
 
 use codewheel_devicenet::explicit::GeneralStatus;
@@ -11,7 +12,7 @@ use codewheel_station::{Deadline, Instant, Station};
 
 use self::body::Body;
 use crate::event::Event;
-use crate::keeping::Answer;
+use crate::keeping::{KEEP_TIME, Outcome};
 use crate::lamp::Lamp;
 use crate::{Product, Snapshot, Switches};
 
@@ -120,33 +121,40 @@ impl<S: Sensor> DeviceNetEncoder<S> {
         self.server.filter()
     }
 
-    /// The record to write into memory now, if there is one. Until [`kept`](Self::kept) has
+    /// The record to write into memory at `now`, if there is one. Until [`kept`](Self::kept) has
     /// reported its end, there is no other.
-    pub fn keep(&mut self) -> Option<Kept> {
+    pub fn keep(&mut self, now: Instant) -> Option<Kept> {
         let Body { keeping, encoder, product, factory, .. } = &mut self.body;
-        keeping.next(product.fingerprint, factory.serial, encoder)
+        keeping.next(now, product.fingerprint, factory.serial, encoder)
     }
 
-    /// Whether [`keep`](Self::keep) has a record.
+    /// Whether [`keep`](Self::keep) has a record at `now`.
     #[must_use]
-    pub const fn keep_due(&self) -> bool {
-        self.body.keeping.is_due()
+    pub fn keep_due(&self, now: Instant) -> bool {
+        self.body.keeping.is_due(now)
     }
 
     /// The write of the record that [`keep`](Self::keep) gave has ended, well or not.
     pub fn kept<E>(&mut self, now: Instant, result: Result<(), E>) {
-        match self.body.keeping.kept(result.is_ok()) {
-            Answer::Nobody if result.is_ok() => {}
-            Answer::Saved => {
+        let good = result.is_ok();
+        let outcome = self.body.keeping.kept(now, good);
+        if !good {
+            self.body.events.push(now, Event::KeepFailed);
+        }
+        match outcome {
+            Outcome::Automatic => {}
+            Outcome::Saved { answer } => {
                 self.body.events.push(now, Event::Saved);
-                self.server.complete(Ok(()));
+                if answer {
+                    self.server.complete(Ok(()));
+                }
             }
-            Answer::Nobody => self.body.events.push(now, Event::KeepFailed),
-            Answer::Failed => {
-                self.body.events.push(now, Event::KeepFailed);
+            Outcome::Failed { answer: true } => {
                 self.server.complete(Err(GeneralStatus::STORE_FAILED.into()));
             }
+            Outcome::Failed { answer: false } => {}
         }
+        self.restart_if_due(now);
     }
 
     /// The oldest event that has not been fetched.
@@ -176,16 +184,25 @@ impl<S: Sensor> DeviceNetEncoder<S> {
             master: self.server.master(),
             explicit: self.server.connection_state(codewheel_devicenet::connection::EXPLICIT),
             poll: self.server.connection_state(codewheel_devicenet::connection::POLL),
+            change_of_state: self
+                .server
+                .connection_state(codewheel_devicenet::connection::CHANGE_OF_STATE),
             memory: keeping.memory,
             writes: keeping.writes,
             events_lost: self.body.events.lost(),
         }
     }
 
-    /// Restarts the device where a reset was answered.
+    /// Restarts the device where a reset was answered, once the memory has what it is to keep: it
+    /// has as long as a Save.
     fn restart_if_due(&mut self, now: Instant) {
-        if self.server.power_cycle_due() {
+        if !self.server.power_cycle_due() {
+            return;
+        }
+        if self.body.keeping.is_idle() || self.body.restart_by.is_due(now) {
             self.power_cycle(now);
+        } else if self.body.restart_by.is_never() {
+            self.body.restart_by = Deadline::at(now + KEEP_TIME);
         }
     }
 }

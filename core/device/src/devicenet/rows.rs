@@ -11,6 +11,8 @@ use crate::product::Product;
 
 /// The class code of the Encoder Position object.
 pub const ENCODER_POSITION: u8 = 0x2F;
+/// The attribute whose write executes the preset function.
+pub(super) const PRESET: u8 = 10;
 
 /// The elementary data type of an attribute (CIP volume 1, appendix C).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

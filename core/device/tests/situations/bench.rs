@@ -85,7 +85,7 @@ impl Bench {
 
     /// Writes what is to be kept into memory, as a host does.
     pub(crate) fn serve_memory(&mut self) {
-        while let Some(kept) = self.device.keep() {
+        while let Some(kept) = self.device.keep(self.now) {
             self.records += 1;
             let (slot, sequence) = start(&self.memory).next();
             let octets: [u8; RECORD_OCTETS] = encode(&kept, sequence);

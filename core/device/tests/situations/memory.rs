@@ -77,7 +77,7 @@ fn a_failed_write_and_a_silent_memory_are_answered_with_store_failed() {
     bench.serves_memory = false;
     bench.write(7, 3_600);
     assert_eq!(bench.ask("16 2F 01"), None);
-    assert!(bench.device.keep().is_some());
+    assert!(bench.device.keep(bench.now).is_some());
     bench.device.kept(bench.now, Err("worn out"));
     assert_eq!(bench.collect(), ["42B#0A9419FF"]);
     assert!(bench.events().contains(&Event::KeepFailed));
@@ -161,7 +161,7 @@ fn a_save_cut_at_any_octet_leaves_the_old_or_the_new_settings() {
     bench.write(7, 2_000);
     bench.serves_memory = false;
     assert_eq!(bench.ask("16 2F 01"), None);
-    let kept = bench.device.keep().expect("a record");
+    let kept = bench.device.keep(bench.now).expect("a record");
     let start = codewheel_encoder::choose(bench.memory.read(Slot::A), bench.memory.read(Slot::B));
     let (slot, sequence) = start.next();
     let octets = codewheel_encoder::encode(&kept, sequence);

@@ -2,12 +2,13 @@
 
 use codewheel_station::{Instant, Writer};
 
+use super::production::{AcknowledgeHandler, Production, Trigger};
 use super::router::put;
 use super::{Io, Server, expect_length, refuse};
 use crate::application::Done;
-use crate::connection::{Connection, State};
+use crate::connection::{CHANGE_OF_STATE, Connection, EXPLICIT, POLL, State};
 use crate::explicit::{Error, GeneralStatus, Header, Service, class};
-use crate::{Application, Event, MacId};
+use crate::{Application, Event, MacId, ProducedPath};
 
 /// The bits of the allocation and release choice octets.
 pub mod choice {
@@ -28,7 +29,13 @@ pub mod choice {
 }
 
 /// What this server can allocate.
-const SUPPORTED: u8 = choice::EXPLICIT | choice::POLL;
+const SUPPORTED: u8 = choice::EXPLICIT
+    | choice::POLL
+    | choice::CHANGE_OF_STATE
+    | choice::CYCLIC
+    | choice::ACKNOWLEDGE_SUPPRESSION;
+/// The bits that name connection instance 4.
+const CHANGE: u8 = choice::CHANGE_OF_STATE | choice::CYCLIC;
 
 /// Additional code 01: the set belongs to another master.
 const ALLOCATION_CONFLICT: u8 = 0x01;
@@ -66,29 +73,51 @@ impl Server {
             }
             _ => Err(Error::with(GeneralStatus::RESOURCE_UNAVAILABLE, NOT_FOR_UNCONNECTED_PORT)),
         };
-        let length = out.len() as u8;
-        let [first, ..] = octets;
-        self.unconnected = Some(match result {
-            Ok(_) => (header, [service.response(), first, 0], length + 1),
-            Err(error) => {
-                (header, [Service::ERROR.response(), error.general.0, error.additional], 3)
-            }
-        });
+        let written = out.len();
+        let [octet, ..] = octets;
+        let result = result.map(|_| (octet, written));
+        self.messages.respond_unconnected(header, service, result);
     }
 
     /// The connections that exist, as an allocation choice octet.
     pub(super) fn allocation_choice(&self) -> u8 {
-        let explicit = if self.explicit.is_some() { choice::EXPLICIT } else { 0 };
-        let poll = if self.poll.is_some() { choice::POLL } else { 0 };
-        explicit | poll
+        self.choice_of(|_| true)
     }
 
     /// The connections that exist and may not be allocated anew.
     fn occupied(&self) -> u8 {
-        let busy = |state| !matches!(state, State::TimedOut | State::DeferredDelete);
-        let explicit = self.explicit.as_ref().is_some_and(|connection| busy(connection.state));
-        let poll = self.poll.as_ref().is_some_and(|io| busy(io.connection.state));
-        (u8::from(explicit) * choice::EXPLICIT) | (u8::from(poll) * choice::POLL)
+        self.choice_of(|state| !matches!(state, State::TimedOut | State::DeferredDelete))
+    }
+
+    fn choice_of(&self, counts: impl Fn(State) -> bool) -> u8 {
+        let exists = |instance| self.connection_state(instance).is_some_and(&counts);
+        let mut choice = 0;
+        if exists(EXPLICIT) {
+            choice |= choice::EXPLICIT;
+        }
+        if exists(POLL) {
+            choice |= choice::POLL;
+        }
+        if exists(CHANGE_OF_STATE)
+            && let Some(production) = &self.production
+        {
+            choice |= match production.trigger {
+                Trigger::ChangeOfState => choice::CHANGE_OF_STATE,
+                Trigger::Cyclic => choice::CYCLIC,
+            };
+            if !production.acknowledged {
+                choice |= choice::ACKNOWLEDGE_SUPPRESSION;
+            }
+        }
+        choice
+    }
+
+    /// A path that was kept, unless the device has no such assembly.
+    fn path<A: Application>(kept: ProducedPath, app: &A) -> ProducedPath {
+        match app.assembly_size(kept.assembly) {
+            Some(_) => kept,
+            None => ProducedPath::default(),
+        }
     }
 
     /// Allocate_Master/Slave_Connection_Set: data `[choice] [allocator's MAC ID]`.
@@ -103,18 +132,17 @@ impl Server {
         let &[wanted, allocator] = data else {
             return Err(refuse(GeneralStatus::NOT_ENOUGH_DATA));
         };
-        // An allocator address above 63 is no node: nobody could own the set.
-        let allocator =
-            MacId::new(allocator).ok_or(refuse(GeneralStatus::INVALID_ATTRIBUTE_VALUE))?;
-        if self.master.is_some_and(|owner| owner != allocator) {
+        if self.master.is_some_and(|owner| owner.value() != allocator) {
             return Err(Error::with(GeneralStatus::OBJECT_STATE_CONFLICT, ALLOCATION_CONFLICT));
         }
+        // Decision: an allocator address above 63 is no node, so nobody would own the set.
+        let allocator =
+            MacId::new(allocator).ok_or(refuse(GeneralStatus::INVALID_ATTRIBUTE_VALUE))?;
         let nonsense = Error::with(GeneralStatus::INVALID_ATTRIBUTE_VALUE, INVALID_CHOICE);
-        let change = choice::CHANGE_OF_STATE | choice::CYCLIC;
         if wanted == 0 {
             return Err(nonsense);
         }
-        if wanted & choice::ACKNOWLEDGE_SUPPRESSION != 0 && wanted & change == 0 {
+        if wanted & choice::ACKNOWLEDGE_SUPPRESSION != 0 && wanted & CHANGE == 0 {
             return Err(nonsense);
         }
         if wanted & !SUPPORTED != 0 {
@@ -123,10 +151,13 @@ impl Server {
         if wanted & choice::EXPLICIT == 0 && self.explicit.is_none() {
             return Err(nonsense);
         }
-        if wanted & change == change {
+        if wanted & CHANGE == CHANGE {
             return Err(nonsense);
         }
-        if wanted & self.occupied() != 0 {
+        // Change of state and cyclic are two ways to use the same connection.
+        let occupied = self.occupied();
+        let occupied = if occupied & CHANGE != 0 { occupied | CHANGE } else { occupied };
+        if wanted & occupied & !choice::ACKNOWLEDGE_SUPPRESSION != 0 {
             return Err(Error::with(GeneralStatus::ALREADY_IN_STATE, INVALID_CHOICE));
         }
         // The answer is written before anything changes, so a full buffer allocates nothing.
@@ -137,8 +168,18 @@ impl Server {
             self.explicit = Some(Connection::explicit(now));
         }
         if wanted & choice::POLL != 0 {
-            let path = self.settings.poll_path;
+            let path = Self::path(self.settings.poll_path, app);
             self.poll = Some(Io { connection: Connection::io(), path, owed: false });
+        }
+        if wanted & CHANGE != 0 {
+            if self.production.is_none() {
+                self.acknowledge_handler = AcknowledgeHandler::DEFAULT;
+            }
+            let trigger =
+                if wanted & choice::CYCLIC == 0 { Trigger::ChangeOfState } else { Trigger::Cyclic };
+            let acknowledged = wanted & choice::ACKNOWLEDGE_SUPPRESSION == 0;
+            let path = Self::path(self.settings.change_path, app);
+            self.production = Some(Production::new(trigger, acknowledged, path));
         }
         app.notice(now, Event::Allocated { master: allocator, choice: wanted });
         Ok(done)
@@ -156,13 +197,15 @@ impl Server {
         let &[released] = data else {
             return Err(refuse(GeneralStatus::NOT_ENOUGH_DATA));
         };
-        if released == 0 {
+        // Bit 6 says how a connection is used and names none.
+        let connections = released & !choice::ACKNOWLEDGE_SUPPRESSION;
+        if connections == 0 {
             return Err(Error::with(GeneralStatus::INVALID_ATTRIBUTE_VALUE, INVALID_CHOICE));
         }
         if released & !SUPPORTED != 0 {
             return Err(Error::with(GeneralStatus::RESOURCE_UNAVAILABLE, INVALID_CHOICE));
         }
-        if released & !self.allocation_choice() != 0 {
+        if connections & !self.allocation_choice() != 0 {
             return Err(Error::with(GeneralStatus::ALREADY_IN_STATE, INVALID_CHOICE));
         }
         if self.master != Some(from) {
@@ -171,6 +214,9 @@ impl Server {
         app.notice(now, Event::Released { choice: released });
         if released & choice::POLL != 0 {
             self.poll = None;
+        }
+        if released & CHANGE != 0 {
+            self.production = None;
         }
         if released & choice::EXPLICIT != 0 {
             self.end_explicit();

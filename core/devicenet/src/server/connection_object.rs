@@ -2,15 +2,25 @@
 
 use codewheel_station::{Instant, Reader, Writer};
 
+use super::production::Trigger;
 use super::router::{attribute, put};
 use super::{REQUEST_OCTETS, RESPONSE_OCTETS, Server, expect_length, refuse};
 use crate::application::{Done, Request};
-use crate::connection::{Connection, EXPLICIT, POLL, State};
-use crate::explicit::{Error, GeneralStatus, Service};
+use crate::connection::{CHANGE_OF_STATE, Connection, EXPLICIT, POLL, State};
+use crate::explicit::{Error, GeneralStatus, Service, class};
 use crate::identifier::{
-    EXPLICIT_REQUEST, EXPLICIT_RESPONSE, POLL_COMMAND, POLL_RESPONSE, group_1, group_2,
+    CHANGE_ACKNOWLEDGE, CHANGE_OF_STATE_MESSAGE, EXPLICIT_REQUEST, EXPLICIT_RESPONSE, POLL_COMMAND,
+    POLL_RESPONSE, group_1, group_2,
 };
 use crate::{Application, Event, ProducedPath};
+
+/// Attribute 5 where nothing is consumed.
+const NO_IDENTIFIER: u16 = 0xFFFF;
+/// Attribute 16 where acknowledges are consumed: class 2Bh instance 1.
+const ACKNOWLEDGE_HANDLER_PATH: [u8; 4] = [0x20, class::ACKNOWLEDGE_HANDLER, 0x24, 1];
+/// Attribute 12 of I/O connections.
+const IO_WATCHDOG_ACTIONS: [u8; 3] =
+    [Connection::TRANSITION_TO_TIMED_OUT, Connection::AUTO_DELETE, Connection::AUTO_RESET];
 
 /// What is fixed about a connection instance.
 struct Fixed {
@@ -21,6 +31,7 @@ struct Fixed {
     initial_characteristics: u8,
     produced_size: u16,
     consumed_size: u16,
+    consumed_path: &'static [u8],
     /// The values that attribute 12 takes.
     watchdog_actions: &'static [u8],
 }
@@ -49,11 +60,15 @@ impl Server {
             Service::RESET => {
                 expect_length(request.data, 0)?;
                 let connection = self.connection_mut(instance)?;
-                if connection.state == State::Configuring {
+                let before = connection.state;
+                if before == State::Configuring {
                     return Err(refuse(GeneralStatus::OBJECT_STATE_CONFLICT));
                 }
                 connection.state = State::Established;
                 connection.arm(now);
+                if before == State::TimedOut {
+                    self.begin_production(now, instance);
+                }
                 Ok(Done::Now)
             }
             Service::APPLY_ATTRIBUTES => {
@@ -63,6 +78,7 @@ impl Server {
                     return Err(refuse(GeneralStatus::OBJECT_STATE_CONFLICT));
                 }
                 connection.establish(now);
+                self.begin_production(now, instance);
                 app.notice(now, Event::Established { instance });
                 put(out.u16_le(fixed.produced_id).and_then(|()| out.u16_le(fixed.consumed_id)))
             }
@@ -80,6 +96,7 @@ impl Server {
                 initial_characteristics: 0x21,
                 produced_size: RESPONSE_OCTETS as u16,
                 consumed_size: REQUEST_OCTETS as u16,
+                consumed_path: &[],
                 watchdog_actions: &[Connection::AUTO_DELETE, Connection::DEFERRED_DELETE],
             }),
             POLL => self.poll.as_ref().map(|io| Fixed {
@@ -90,31 +107,57 @@ impl Server {
                 initial_characteristics: 0x01,
                 produced_size: app.assembly_size(io.path.assembly).unwrap_or(0) as u16,
                 consumed_size: 0,
-                watchdog_actions: &[
-                    Connection::TRANSITION_TO_TIMED_OUT,
-                    Connection::AUTO_DELETE,
-                    Connection::AUTO_RESET,
-                ],
+                consumed_path: &[],
+                watchdog_actions: &IO_WATCHDOG_ACTIONS,
+            }),
+            CHANGE_OF_STATE => self.production.as_ref().map(|production| Fixed {
+                instance_type: 1,
+                transport_class_trigger: match (production.trigger, production.acknowledged) {
+                    (Trigger::ChangeOfState, true) => 0x13,
+                    (Trigger::ChangeOfState, false) => 0x10,
+                    (Trigger::Cyclic, true) => 0x03,
+                    (Trigger::Cyclic, false) => 0x00,
+                },
+                produced_id: group_1(CHANGE_OF_STATE_MESSAGE, self.mac),
+                consumed_id: if production.acknowledged {
+                    group_2(self.mac, CHANGE_ACKNOWLEDGE)
+                } else {
+                    NO_IDENTIFIER
+                },
+                initial_characteristics: if production.acknowledged { 0x01 } else { 0x0F },
+                produced_size: app.assembly_size(production.io.path.assembly).unwrap_or(0) as u16,
+                consumed_size: 0,
+                consumed_path: if production.acknowledged {
+                    &ACKNOWLEDGE_HANDLER_PATH
+                } else {
+                    &[]
+                },
+                watchdog_actions: &IO_WATCHDOG_ACTIONS,
             }),
             _ => None,
+        }
+    }
+
+    /// Connection instance 4 produces at once when it is established or revived.
+    fn begin_production(&mut self, now: Instant, instance: u8) {
+        if instance == CHANGE_OF_STATE
+            && let Some(production) = &mut self.production
+        {
+            production.begin(now);
         }
     }
 
     fn connection_mut(&mut self, instance: u8) -> Result<&mut Connection, Error> {
         match instance {
             EXPLICIT => self.explicit.as_mut(),
-            POLL => self.poll.as_mut().map(|io| &mut io.connection),
-            _ => None,
+            _ => self.io_mut(instance).map(|io| &mut io.connection),
         }
         .ok_or(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST))
     }
 
     /// The produced path of an I/O connection; the explicit connection has none.
     fn produced_path(&self, instance: u8) -> Option<ProducedPath> {
-        match instance {
-            POLL => self.poll.as_ref().map(|io| io.path),
-            _ => None,
-        }
+        self.io(instance).map(|io| io.path)
     }
 
     fn connection_attribute(
@@ -139,8 +182,8 @@ impl Server {
             12 => out.u8(connection.watchdog_action),
             13 => out.u16_le(path.map_or(0, |path| path.length() as u16)),
             14 => path.map_or(Ok(()), |path| path.write(out)),
-            15 => out.u16_le(0),
-            16 => Ok(()),
+            15 => out.u16_le(fixed.consumed_path.len() as u16),
+            16 => out.octets(fixed.consumed_path),
             17 if instance != EXPLICIT => out.u16_le(connection.production_inhibit),
             _ => return Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
         })
@@ -164,7 +207,13 @@ impl Server {
                 let configuring = connection.state == State::Configuring;
                 connection.set_expected_packet_rate(now, rate)?;
                 if configuring {
+                    self.begin_production(now, instance);
                     app.notice(now, Event::Established { instance });
+                } else if instance == CHANGE_OF_STATE
+                    && let Some(production) = &mut self.production
+                    && production.io.connection.is_established()
+                {
+                    production.restart_rate(now);
                 }
                 put(out.u16_le(rate))
             }
@@ -209,13 +258,14 @@ impl Server {
         let path = ProducedPath::parse(data)
             .filter(|path| app.assembly_size(path.assembly).is_some())
             .ok_or(refuse(GeneralStatus::INVALID_ATTRIBUTE_VALUE))?;
-        if let Some(io) = &mut self.poll {
+        if let Some(io) = self.io_mut(instance) {
             io.path = path;
         }
-        if self.settings.poll_path != path {
-            self.settings.poll_path = path;
-            app.keep(now, self.settings);
+        match instance {
+            CHANGE_OF_STATE => self.settings.change_path = path,
+            _ => self.settings.poll_path = path,
         }
+        app.keep(now, self.settings);
         Ok(Done::Now)
     }
 }

@@ -4,24 +4,27 @@
 //! [`Application`], lent for one call at a time. What is owed to the wire is kept as flags and
 //! built when the wire can take it, so a poll answered late is answered once, with the newest data.
 
+mod acknowledge_handler;
 mod allocation;
-pub use allocation::choice;
 mod connection_object;
+mod messages;
 mod objects;
+mod ownership;
+mod production;
 mod router;
 
 use codewheel_station::can::{self, BitRate, Filter, Frame};
-use codewheel_station::{Deadline, Instant};
+use codewheel_station::{Deadline, Duration, Instant};
 
-use crate::connection::{Connection, EXPLICIT, POLL, State};
+pub use self::allocation::choice;
+use self::messages::Messages;
+use self::production::{AcknowledgeHandler, Production};
+use crate::connection::{CHANGE_OF_STATE, Connection, EXPLICIT, POLL, State};
 use crate::duplicate::Change;
 use crate::explicit::{Error, GeneralStatus, Header, Service};
-use crate::fragment::{
-    Fragment, Kind, Piece, Reassembly, Received, STATUS_OK, STATUS_TOO_MUCH_DATA, Sending,
-};
 use crate::identifier::{
-    DUPLICATE_MAC_CHECK, EXPLICIT_REQUEST, EXPLICIT_RESPONSE, POLL_COMMAND, POLL_RESPONSE,
-    UNCONNECTED_REQUEST, group_1, group_2,
+    CHANGE_ACKNOWLEDGE, CHANGE_OF_STATE_MESSAGE, DUPLICATE_MAC_CHECK, EXPLICIT_REQUEST,
+    EXPLICIT_RESPONSE, POLL_COMMAND, POLL_RESPONSE, UNCONNECTED_REQUEST, group_1, group_2,
 };
 use crate::{Application, DuplicateMacCheck, Event, Fault, MacId, NetworkSettings, ProducedPath};
 
@@ -54,20 +57,15 @@ struct Io {
     owed: bool,
 }
 
-/// A service that is answered once the device has done it.
-#[derive(Clone, Copy, Debug)]
-struct Pending {
-    header: Header,
-    service: Service,
-    result: Option<Result<(), Error>>,
-}
-
 /// How far a reset by the Identity object has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Restart {
     No,
-    /// The answer is not on the wire yet.
+    /// The device writes its defaults first.
+    Writing,
+    /// Accepted; the answer is not on the wire yet.
     Answering,
+    /// The device is to cycle its power; nothing is heard or said any more.
     Due,
 }
 
@@ -83,18 +81,12 @@ pub struct Server {
     master: Option<MacId>,
     explicit: Option<Connection>,
     poll: Option<Io>,
-    /// The fragmented request on its way in, and the header of its fragments.
-    request: Reassembly<REQUEST_OCTETS>,
-    /// The response on its way out.
-    response: [u8; RESPONSE_OCTETS],
-    response_header: Header,
-    sending: Sending,
-    /// A fragment to be acknowledged: its header, count and status.
-    acknowledge: Option<(Header, u8, u8)>,
-    /// The response to an unconnected request: at most header and three octets.
-    unconnected: Option<(Header, [u8; 3], u8)>,
-    pending: Option<Pending>,
+    production: Option<Production>,
+    acknowledge_handler: AcknowledgeHandler,
+    messages: Messages,
     restart: Restart,
+    heartbeat_owed: bool,
+    heartbeat_at: Deadline,
 }
 
 impl Server {
@@ -110,18 +102,17 @@ impl Server {
             master: None,
             explicit: None,
             poll: None,
-            request: Reassembly::new(),
-            response: [0; RESPONSE_OCTETS],
-            response_header: Header(0),
-            sending: Sending::IDLE,
-            acknowledge: None,
-            unconnected: None,
-            pending: None,
+            production: None,
+            acknowledge_handler: AcknowledgeHandler::DEFAULT,
+            messages: Messages::new(),
             restart: Restart::No,
+            heartbeat_owed: false,
+            heartbeat_at: Deadline::NEVER,
         }
     }
 
-    /// A server that stays off the bus: the address switches give no MAC ID.
+    /// A server that stays off the bus: the address switches give no MAC ID. Its
+    /// [`mac`](Self::mac) and [`filter`](Self::filter) name MAC ID 63 and mean nothing.
     #[must_use]
     pub fn off_the_bus(bit_rate: BitRate, settings: NetworkSettings) -> Self {
         let mut server = Self::new(MacId::MAX, bit_rate, settings);
@@ -158,9 +149,18 @@ impl Server {
     pub fn connection_state(&self, instance: u8) -> Option<State> {
         match instance {
             EXPLICIT => self.explicit.as_ref().map(|connection| connection.state),
-            POLL => self.poll.as_ref().map(|io| io.connection.state),
-            _ => None,
+            _ => self.io(instance).map(|io| io.connection.state),
         }
+    }
+
+    /// Whether a change of state connection is established, so that the device must watch its data
+    /// closely.
+    #[must_use]
+    pub fn watches_changes(&self) -> bool {
+        self.production.as_ref().is_some_and(|production| {
+            production.io.connection.is_established()
+                && production.trigger == production::Trigger::ChangeOfState
+        })
     }
 
     /// What the lamp shows.
@@ -170,9 +170,9 @@ impl Server {
             NetworkStatus::Faulted(fault)
         } else if !self.network.is_on_line() {
             NetworkStatus::NotOnLine
-        } else if self.poll.as_ref().is_some_and(|io| io.connection.state == State::TimedOut) {
+        } else if self.io_is(State::TimedOut) {
             NetworkStatus::TimedOut
-        } else if self.explicit.is_some() || self.io_is_established() {
+        } else if self.explicit.is_some() || self.io_is(State::Established) {
             NetworkStatus::Connected
         } else {
             NetworkStatus::OnLine
@@ -192,8 +192,9 @@ impl Server {
             can::Input::Frame(frame) => self.frame(now, frame, app),
             can::Input::Sent(frame) => self.sent(now, frame),
             can::Input::BusOff => self.bus_off(now, app),
-            can::Input::Recovered => {}
+            can::Input::Recovered => self.recovered(),
         }
+        self.look_for_changes(now, app);
     }
 
     fn frame<A: Application>(&mut self, now: Instant, frame: &Frame, app: &mut A) {
@@ -208,11 +209,13 @@ impl Server {
             }
             return;
         }
-        if !self.network.is_on_line() {
+        let restarting = matches!(self.restart, Restart::Answering | Restart::Due);
+        if !self.network.is_on_line() || restarting {
             return;
         }
         match message {
             POLL_COMMAND => self.poll_command(now, frame.data(), app),
+            CHANGE_ACKNOWLEDGE => self.change_acknowledge(now, frame.data()),
             EXPLICIT_REQUEST => self.explicit_request(now, frame.data(), app),
             UNCONNECTED_REQUEST => self.unconnected_request(now, frame.data(), app),
             _ => {}
@@ -221,105 +224,84 @@ impl Server {
 
     fn sent(&mut self, now: Instant, frame: &Frame) {
         let can::Identifier::Standard(bits) = frame.identifier() else { return };
-        self.network.sent(now, bits);
-        if bits == group_2(self.mac, EXPLICIT_RESPONSE) {
-            self.sending.sent(now);
-            let answered = self.sending.is_idle() && self.pending.is_none();
-            if self.restart == Restart::Answering && answered {
+        if bits == group_1(CHANGE_OF_STATE_MESSAGE, self.mac) {
+            if let Some(production) = &mut self.production {
+                production.sent(now, self.acknowledge_handler);
+            }
+        } else if bits == group_2(self.mac, EXPLICIT_RESPONSE) {
+            self.messages.sent(now, frame);
+            let answer =
+                matches!(*frame.data(), [_, service] if service == Service::RESET.response());
+            if self.restart == Restart::Answering && answer {
                 self.restart = Restart::Due;
             }
+        } else {
+            self.network.sent(now, bits);
         }
     }
 
+    /// The controller has left the bus: all connections are gone, and the node stays silent until
+    /// it recovers and BOI lets it.
     fn bus_off<A: Application>(&mut self, now: Instant, app: &mut A) {
         self.bus_off_counter = self.bus_off_counter.saturating_add(1);
         self.fall_silent(now, Fault::BusOff, app);
     }
 
-    /// Red, silent, until the next power cycle; all connections are gone.
+    /// With bus-off interrupt 1 the node checks its MAC ID anew. Other faults outlast a recovery.
+    fn recovered(&mut self) {
+        if self.settings.bus_off_interrupt && self.network.faulted() == Some(Fault::BusOff) {
+            self.network = DuplicateMacCheck::begin(self.mac);
+        }
+    }
+
+    /// Red and silent; all connections are gone. A reset that was accepted and not carried out is
+    /// off: only a power cycle ends a fault.
     fn fall_silent<A: Application>(&mut self, now: Instant, fault: Fault, app: &mut A) {
+        if self.restart != Restart::Due {
+            self.restart = Restart::No;
+        }
         self.network.fault(fault);
         self.forget_master();
+        self.messages = Messages::new();
+        self.heartbeat_owed = false;
+        self.heartbeat_at = Deadline::NEVER;
         app.notice(now, Event::Faulted(fault));
     }
 
     /// Runs what fell due up to `now`.
     pub fn advance<A: Application>(&mut self, now: Instant, app: &mut A) {
         if self.network.advance(now) == Some(Change::OnLine) {
+            self.restart_heartbeat(now);
             app.notice(now, Event::OnLine);
         }
         if self.poll.as_ref().is_some_and(|io| io.connection.is_inactive(now)) {
-            self.poll_timed_out(now, app);
+            self.io_timed_out(now, POLL, app);
+        }
+        let inactive = |production: &Production| production.io.connection.is_inactive(now);
+        if self.production.as_ref().is_some_and(inactive) {
+            self.io_timed_out(now, CHANGE_OF_STATE, app);
         }
         if self.explicit.as_ref().is_some_and(|connection| connection.is_inactive(now)) {
             self.explicit_timed_out(now, app);
         }
-        if self.sending.advance(now) {
+        if self.messages.advance(now) {
             app.notice(now, Event::ResponseGivenUp);
         }
-    }
-
-    fn poll_timed_out<A: Application>(&mut self, now: Instant, app: &mut A) {
-        let Some(io) = &mut self.poll else { return };
-        app.notice(now, Event::TimedOut { instance: POLL });
-        match io.connection.watchdog_action {
-            Connection::AUTO_RESET => io.connection.arm(now),
-            Connection::AUTO_DELETE => self.poll = None,
-            _ => {
-                io.connection.state = State::TimedOut;
-                io.connection.disarm();
-                io.owed = false;
-            }
+        if self.heartbeat_at.is_due(now) {
+            self.heartbeat_owed = true;
+            self.restart_heartbeat(now);
         }
-        self.settle_ownership(now, app);
+        self.look_for_changes(now, app);
     }
 
-    fn explicit_timed_out<A: Application>(&mut self, now: Instant, app: &mut A) {
-        let lives_on = self.io_is_established();
-        let Some(connection) = &mut self.explicit else { return };
-        app.notice(now, Event::TimedOut { instance: EXPLICIT });
-        if connection.watchdog_action == Connection::DEFERRED_DELETE && lives_on {
-            connection.state = State::DeferredDelete;
-            connection.disarm();
-        } else {
-            self.end_explicit();
-            self.settle_ownership(now, app);
+    /// Asks the device whether its data have changed, where a change of state connection wants to
+    /// know, and decides what is to be produced.
+    fn look_for_changes<A: Application>(&mut self, now: Instant, app: &mut A) {
+        let Some(production) = &mut self.production else { return };
+        if production.watches() && app.has_changed(production.io.path.assembly) {
+            production.changed();
         }
-    }
-
-    fn io_is_established(&self) -> bool {
-        self.poll.as_ref().is_some_and(|io| io.connection.is_established())
-    }
-
-    fn end_explicit(&mut self) {
-        self.explicit = None;
-        self.request.clear();
-        self.sending.stop();
-        self.acknowledge = None;
-        if self.pending.take().is_none() && self.restart == Restart::Answering {
-            // Nobody is left to read the answer; the reset itself was accepted.
-            self.restart = Restart::Due;
-        }
-    }
-
-    /// Forgets the master when it holds neither the explicit nor an established I/O connection, so
-    /// that one that dies in mid-configuration never locks others out.
-    fn settle_ownership<A: Application>(&mut self, now: Instant, app: &mut A) {
-        if self.master.is_none() || self.io_is_established() {
-            return;
-        }
-        let explicit_lives =
-            self.explicit.as_ref().is_some_and(|connection| connection.is_established());
-        if !explicit_lives {
-            self.forget_master();
-            app.notice(now, Event::Forgotten);
-        }
-    }
-
-    fn forget_master(&mut self) {
-        self.end_explicit();
-        self.poll = None;
-        self.master = None;
+        production.advance(now, self.acknowledge_handler);
     }
 
     fn poll_command<A: Application>(&mut self, now: Instant, data: &[u8], app: &mut A) {
@@ -336,63 +318,51 @@ impl Server {
         io.owed = true;
     }
 
+    /// The master's acknowledge of a change of state or cyclic production: an empty frame.
+    fn change_acknowledge(&mut self, now: Instant, data: &[u8]) {
+        if let Some(production) = &mut self.production
+            && production.io.connection.is_established()
+            && production.acknowledged
+            && data.is_empty()
+        {
+            production.acknowledge(now);
+        }
+    }
+
     fn explicit_request<A: Application>(&mut self, now: Instant, data: &[u8], app: &mut A) {
-        let Some((&first, rest)) = data.split_first() else { return };
-        let header = Header(first);
+        let [first, rest @ ..] = data else { return };
+        let header = Header(*first);
         if self.master != Some(header.mac()) || rest.is_empty() {
             return;
         }
         let Some(connection) = &mut self.explicit else { return };
-        if header.fragmented() && rest.len() < 2 {
-            // A fragmentation octet with nothing behind it is no fragment.
-            return;
-        }
         connection.state = State::Established;
         connection.arm(now);
         if !header.fragmented() {
-            self.request.clear();
+            self.messages.unfragmented();
             self.request(now, header, rest, app);
-            return;
-        }
-        let Some((&second, octets)) = rest.split_first() else { return };
-        let fragment = Fragment::from_octet(second);
-        if fragment.kind == Kind::Acknowledge {
-            if let Some(&status) = octets.first() {
-                self.sending.acknowledged(fragment.count, status);
-            }
-            return;
-        }
-        match self.request.push(fragment, octets) {
-            Received::Dropped => {}
-            Received::Taken => self.acknowledge = Some((header, fragment.count, STATUS_OK)),
-            Received::TooMuch => {
-                self.acknowledge = Some((header, fragment.count, STATUS_TOO_MUCH_DATA));
-            }
-            Received::Complete => {
-                self.acknowledge = Some((header, fragment.count, STATUS_OK));
-                let mut body = [0; REQUEST_OCTETS];
-                let length = self.request.body().len();
-                for (to, from) in body.iter_mut().zip(self.request.body()) {
-                    *to = *from;
-                }
-                let body = body.get(..length).unwrap_or_default();
-                self.request(now, header.with_fragmented(false), body, app);
+        } else if let [octet, octets @ ..] = rest
+            && let Some((body, length)) = self.messages.fragment(header, *octet, octets)
+        {
+            self.request(now, header, body.get(..length).unwrap_or(&body), app);
+            if self.explicit.is_none() {
+                // The request released its own connection; its last fragment arrived all the same.
+                self.messages.acknowledge(header, *octet);
             }
         }
     }
 
-    /// Ends a service that was answered with [`Done::Later`](crate::Done::Later). Without one
-    /// pending, or when its connection is gone, nothing happens. Ask
-    /// [`transmit`](Self::transmit) afterwards.
+    /// Ends a service that was answered with [`Done::Later`](crate::Done::Later). When its
+    /// connection is gone nobody is told. Ask [`transmit`](Self::transmit) afterwards.
     pub fn complete(&mut self, result: Result<(), Error>) {
-        if self.restart == Restart::Answering && result.is_err() {
-            self.restart = Restart::No;
+        if self.restart == Restart::Writing {
+            self.restart = match result {
+                Ok(()) if self.messages.is_pending() => Restart::Answering,
+                Ok(()) => Restart::Due,
+                Err(_) => Restart::No,
+            };
         }
-        if let Some(pending) = &mut self.pending {
-            pending.result = Some(result);
-        } else if self.restart == Restart::Answering {
-            self.restart = Restart::Due;
-        }
+        self.messages.complete(result);
     }
 
     /// Whether the device shall cycle its power now: a reset of the Identity object was answered.
@@ -403,84 +373,59 @@ impl Server {
 
     /// Asks `app` for a production and builds the frame, lowest identifier first.
     pub fn transmit<A: Application>(&mut self, now: Instant, app: &mut A) -> Option<Frame> {
+        if !self.network.is_on_line() {
+            let identity = app.identity();
+            return self.network.transmit(identity.vendor, identity.serial);
+        }
+        if self.restart == Restart::Due {
+            return None;
+        }
+        if let Some(production) = &mut self.production
+            && production.io.owed
+        {
+            let assembly = production.io.path.assembly;
+            production.produced(now);
+            let frame = produce(now, CHANGE_OF_STATE_MESSAGE, self.mac, assembly, app);
+            app.change_produced(assembly);
+            return Some(frame);
+        }
         if let Some(io) = &mut self.poll
             && io.owed
         {
             io.owed = false;
-            let mut octets = [0; 8];
-            let size = app.produce(now, io.path.assembly, &mut octets);
-            let identifier = group_1(POLL_RESPONSE, self.mac);
-            return Some(Frame::standard(identifier, octets.get(..size).unwrap_or(&octets)));
+            return Some(produce(now, POLL_RESPONSE, self.mac, io.path.assembly, app));
         }
-        self.explicit_frame(now).or_else(|| {
-            let identity = app.identity();
-            self.network.transmit(identity.vendor, identity.serial)
-        })
-    }
-
-    fn explicit_frame(&mut self, now: Instant) -> Option<Frame> {
         let identifier = group_2(self.mac, EXPLICIT_RESPONSE);
-        let mut octets = [0; 8];
-        if let Some((header, body, length)) = self.unconnected.take() {
-            let [first, rest @ ..] = &mut octets;
-            *first = header.with_fragmented(false).0;
-            for (to, from) in rest.iter_mut().zip(body) {
-                *to = from;
-            }
-            let end = usize::from(length) + 1;
-            return Some(Frame::standard(identifier, octets.get(..end).unwrap_or(&octets)));
+        if let Some(frame) = self.messages.transmit(now, identifier) {
+            return Some(frame);
         }
-        if let Some((header, count, status)) = self.acknowledge.take() {
-            let fragment = Fragment { kind: Kind::Acknowledge, count };
-            let header = header.with_fragmented(true).0;
-            return Some(Frame::standard(identifier, &[header, fragment.to_octet(), status]));
+        if self.heartbeat_owed {
+            self.heartbeat_owed = false;
+            return Some(self.heartbeat(identifier, app));
         }
-        if self.sending.is_idle()
-            && let Some(Pending { header, service, result: Some(result) }) = self.pending
-        {
-            self.pending = None;
-            self.respond(header, service, result.map(|()| 0));
-        }
-        if !self.sending.is_owed() {
-            return None;
-        }
-        let [first, rest @ ..] = &mut octets;
-        let (end, piece) = match self.sending.next(now, &self.response)? {
-            Piece::Whole(octets) => {
-                *first = self.response_header.with_fragmented(false).0;
-                (1, octets)
-            }
-            Piece::Fragment(fragment, octets) => {
-                *first = self.response_header.with_fragmented(true).0;
-                let [second, ..] = rest;
-                *second = fragment.to_octet();
-                (2, octets)
-            }
-        };
-        for (to, from) in octets.iter_mut().skip(end).zip(piece) {
-            *to = *from;
-        }
-        Some(Frame::standard(identifier, octets.get(..end + piece.len()).unwrap_or(&octets)))
+        let identity = app.identity();
+        self.network.transmit(identity.vendor, identity.serial)
     }
 
-    /// Begins to send a response. `written` octets of data already stand behind the service octet
-    /// in the response buffer.
-    fn respond(&mut self, header: Header, service: Service, result: Result<usize, Error>) {
-        let [first, second, third, ..] = &mut self.response;
-        let length = match result {
-            Ok(written) => {
-                *first = service.response();
-                written + 1
-            }
-            Err(error) => {
-                *first = Service::ERROR.response();
-                *second = error.general.0;
-                *third = error.additional;
-                3
-            }
+    /// The Device Heartbeat Message: `[MAC] [CD] [instance u16] [state] [flags] [CCV u16]`.
+    fn heartbeat<A: Application>(&self, identifier: u16, app: &A) -> Frame {
+        /// Response bit and service 4Dh.
+        const HEARTBEAT: u8 = 0xCD;
+        /// Flags bit 1: a fault that the status word names (decision; the others stay 0).
+        const SYSTEM_FAULT: u8 = 1 << 1;
+        const FAULTS: u16 = 0x0F00;
+        let flags = if app.status() & FAULTS != 0 { SYSTEM_FAULT } else { 0 };
+        let [low, high] = app.configuration_consistency().to_le_bytes();
+        let state = objects::OPERATIONAL;
+        Frame::standard(identifier, &[self.mac.value(), HEARTBEAT, 1, 0, state, flags, low, high])
+    }
+
+    /// The heartbeat interval begins anew.
+    fn restart_heartbeat(&mut self, now: Instant) {
+        self.heartbeat_at = match self.settings.heartbeat_interval {
+            0 => Deadline::NEVER,
+            seconds => Deadline::at(now + Duration::from_secs(u64::from(seconds))),
         };
-        self.response_header = header;
-        self.sending.begin(length as u16);
     }
 
     /// When [`advance`](Self::advance) must run.
@@ -488,9 +433,23 @@ impl Server {
     pub fn deadline(&self) -> Option<Instant> {
         let explicit = self.explicit.as_ref().map_or(Deadline::NEVER, Connection::deadline);
         let poll = self.poll.as_ref().map_or(Deadline::NEVER, |io| io.connection.deadline());
-        let own = self.network.deadline().min(self.sending.deadline());
-        own.min(explicit).min(poll).instant()
+        let production = self.production.as_ref().map_or(Deadline::NEVER, Production::deadline);
+        let own = self.network.deadline().min(self.messages.deadline()).min(self.heartbeat_at);
+        own.min(explicit).min(poll).min(production).instant()
     }
+}
+
+/// The frame of group 1 that carries `assembly` as of now.
+fn produce<A: Application>(
+    now: Instant,
+    message: u8,
+    mac: MacId,
+    assembly: u8,
+    app: &mut A,
+) -> Frame {
+    let mut octets = [0; 8];
+    let size = app.produce(now, assembly, &mut octets);
+    Frame::standard(group_1(message, mac), octets.get(..size).unwrap_or(&octets))
 }
 
 /// A refusal without an additional code.

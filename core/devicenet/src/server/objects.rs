@@ -7,25 +7,26 @@ use codewheel_station::{Instant, Writer};
 use super::router::{attribute, put};
 use super::{Restart, Server, expect_length, refuse};
 use crate::application::{Class, Done, Request, Reset};
-use crate::connection::POLL;
+use crate::connection::CHANGE_OF_STATE;
 use crate::explicit::{Error, GeneralStatus, Service, class};
 use crate::{Application, Identity};
 
 /// Identity attribute 8: operational.
-const OPERATIONAL: u8 = 3;
+pub(super) const OPERATIONAL: u8 = 3;
 /// Identity attribute 5, bit 0: a master owns the connection set.
 const OWNED: u16 = 1;
 
 impl Server {
     /// Class attributes of the stack's own classes.
-    pub(super) const fn own_class(class: u8) -> Option<Class> {
-        Some(match class {
-            class::IDENTITY | class::MESSAGE_ROUTER => Class { revision: 1, max_instance: 1 },
-            class::DEVICENET => Class { revision: 2, max_instance: 1 },
-            class::ASSEMBLY => Class { revision: 2, max_instance: 2 },
-            class::CONNECTION => Class { revision: 1, max_instance: POLL as u16 },
+    pub(super) fn own_class<A: Application>(class: u8, app: &A) -> Option<Class> {
+        let (revision, max_instance) = match class {
+            class::IDENTITY | class::MESSAGE_ROUTER | class::ACKNOWLEDGE_HANDLER => (1, 1),
+            class::DEVICENET => (2, 1),
+            class::ASSEMBLY => (2, app.highest_assembly()),
+            class::CONNECTION => (1, CHANGE_OF_STATE),
             _ => return None,
-        })
+        };
+        Some(Class { revision, max_instance: u16::from(max_instance) })
     }
 
     pub(super) fn identity<A: Application>(
@@ -44,10 +45,27 @@ impl Server {
                 expect_length(data, 0)?;
                 self.identity_attribute(path.attribute, out, app)
             }
-            Service::SET_ATTRIBUTE_SINGLE => match attribute(request)?.0.attribute {
-                1..=9 => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)),
-                _ => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
-            },
+            Service::SET_ATTRIBUTE_SINGLE => {
+                let (path, data) = attribute(request)?;
+                match (path.attribute, data) {
+                    (1..=9, _) => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)),
+                    (10, &[interval]) => {
+                        self.settings.heartbeat_interval = interval;
+                        self.restart_heartbeat(now);
+                        app.keep(now, self.settings);
+                        Ok(Done::Now)
+                    }
+                    (10, data) => expect_length(data, 1).map(|()| Done::Now),
+                    _ => Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
+                }
+            }
+            Service::GET_ATTRIBUTES_ALL => {
+                expect_length(request.data, 0)?;
+                for attribute in 1..=10 {
+                    self.identity_attribute(attribute, out, app)?;
+                }
+                Ok(Done::Now)
+            }
             Service::RESET => {
                 let reset = match *request.data {
                     [] | [0] => Reset::PowerCycle,
@@ -56,7 +74,10 @@ impl Server {
                     _ => return Err(refuse(GeneralStatus::TOO_MUCH_DATA)),
                 };
                 let done = app.reset(now, reset)?;
-                self.restart = Restart::Answering;
+                self.restart = match done {
+                    Done::Now => Restart::Answering,
+                    Done::Later => Restart::Writing,
+                };
                 Ok(done)
             }
             _ => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
@@ -90,6 +111,7 @@ impl Server {
             }
             8 => out.u8(OPERATIONAL),
             9 => out.u16_le(app.configuration_consistency()),
+            10 => out.u8(self.settings.heartbeat_interval),
             _ => return Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
         })
     }
@@ -120,10 +142,8 @@ impl Server {
                             [1] => true,
                             _ => return Err(refuse(GeneralStatus::INVALID_ATTRIBUTE_VALUE)),
                         };
-                        if self.settings.bus_off_interrupt != bus_off_interrupt {
-                            self.settings.bus_off_interrupt = bus_off_interrupt;
-                            app.keep(now, self.settings);
-                        }
+                        self.settings.bus_off_interrupt = bus_off_interrupt;
+                        app.keep(now, self.settings);
                         Ok(Done::Now)
                     }
                     4 => {
@@ -153,7 +173,7 @@ impl Server {
         out: &mut Writer<'_>,
         app: &A,
     ) -> Result<Done, Error> {
-        let bit_rate = match self.bit_rate {
+        let code = |bit_rate| match bit_rate {
             BitRate::Kbit125 => 0,
             BitRate::Kbit250 => 1,
             BitRate::Kbit500 => 2,
@@ -161,16 +181,16 @@ impl Server {
         let switches = app.switches();
         put(match attribute {
             1 => out.u8(self.mac.value()),
-            2 => out.u8(bit_rate),
+            2 => out.u8(code(self.bit_rate)),
             3 => out.u8(u8::from(self.settings.bus_off_interrupt)),
             4 => out.u8(self.bus_off_counter),
             5 => {
                 out.octets(&[self.allocation_choice(), self.master.map_or(0xFF, |mac| mac.value())])
             }
             6 => out.u8(u8::from(switches.mac != self.mac.value())),
-            7 => out.u8(u8::from(switches.bit_rate != bit_rate)),
+            7 => out.u8(u8::from(switches.bit_rate != self.bit_rate)),
             8 => out.u8(switches.mac),
-            9 => out.u8(switches.bit_rate),
+            9 => out.u8(code(switches.bit_rate)),
             _ => return Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)),
         })
     }

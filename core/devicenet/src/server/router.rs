@@ -2,7 +2,7 @@
 
 use codewheel_station::{Instant, Writer};
 
-use super::{Pending, RESPONSE_OCTETS, Server, expect_length, refuse};
+use super::{RESPONSE_OCTETS, Restart, Server, expect_length, refuse};
 use crate::application::{Done, Request};
 use crate::explicit::{Error, GeneralStatus, Header, Path, Service, class};
 use crate::{Application, Class};
@@ -22,29 +22,30 @@ impl Server {
             return;
         }
         let service = Service(service);
-        if self.pending.is_some() {
+        if self.messages.is_pending() || self.restart == Restart::Writing {
             let busy = refuse(GeneralStatus::DEVICE_STATE_CONFLICT);
-            return self.respond(header, service, Err(busy));
+            return self.messages.respond(header, service, Err(busy));
         }
         let &[class, instance, ref data @ ..] = rest else {
             let short = refuse(GeneralStatus::NOT_ENOUGH_DATA);
-            return self.respond(header, service, Err(short));
+            return self.messages.respond(header, service, Err(short));
         };
         let request = Request { service, class, instance, data };
         let mut octets = [0; RESPONSE_OCTETS - 1];
         let mut out = Writer::new(&mut octets);
         let result = self.route(now, request, &mut out, app);
         let written = out.len();
-        match result {
-            Ok(Done::Later) => self.pending = Some(Pending { header, service, result: None }),
+        let result = match result {
+            Ok(Done::Later) => return self.messages.defer(header, service),
             Ok(Done::Now) => {
-                for (to, from) in self.response.iter_mut().skip(1).zip(&octets).take(written) {
+                for (to, from) in self.messages.room().iter_mut().zip(&octets).take(written) {
                     *to = *from;
                 }
-                self.respond(header, service, Ok(written));
+                Ok(written)
             }
-            Err(error) => self.respond(header, service, Err(error)),
-        }
+            Err(error) => Err(error),
+        };
+        self.messages.respond(header, service, result);
     }
 
     fn route<A: Application>(
@@ -54,7 +55,7 @@ impl Server {
         out: &mut Writer<'_>,
         app: &mut A,
     ) -> Result<Done, Error> {
-        let own = Self::own_class(request.class);
+        let own = Self::own_class(request.class, app);
         let about = own
             .or_else(|| app.class(request.class))
             .ok_or(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST))?;
@@ -67,6 +68,7 @@ impl Server {
             class::DEVICENET => self.devicenet(now, request, out, app),
             class::ASSEMBLY => assembly(now, request, out, app),
             class::CONNECTION => self.connection(now, request, out, app),
+            class::ACKNOWLEDGE_HANDLER => self.acknowledge_handler(request, out),
             _ => match request.service {
                 Service::GET_ATTRIBUTE_SINGLE => {
                     let (path, data) = attribute(request)?;

@@ -17,6 +17,8 @@ pub(crate) struct Toy {
     pub(crate) events: Vec<Event>,
     pub(crate) produced: u32,
     pub(crate) reset: Option<Reset>,
+    /// Whether the data have changed since they were produced.
+    pub(crate) moved: bool,
 }
 
 pub(crate) const TEXT: &[u8; 40] = b"a text that does not fit a single frame.";
@@ -34,7 +36,7 @@ impl Application for Toy {
         }
     }
     fn switches(&self) -> SwitchPositions {
-        SwitchPositions { mac: 7, bit_rate: 2 }
+        SwitchPositions { mac: 7, bit_rate: BitRate::Kbit500 }
     }
     fn assembly_size(&self, instance: u8) -> Option<usize> {
         [None, Some(4), Some(5)].get(usize::from(instance)).copied().flatten()
@@ -43,6 +45,15 @@ impl Application for Toy {
         self.produced += 1;
         octets[..4].copy_from_slice(&self.produced.to_le_bytes());
         usize::from(instance) + 3
+    }
+    fn highest_assembly(&self) -> u8 {
+        2
+    }
+    fn has_changed(&mut self, _: u8) -> bool {
+        self.moved
+    }
+    fn change_produced(&mut self, _: u8) {
+        self.moved = false;
     }
     fn class(&self, class: u8) -> Option<Class> {
         (class == 0x64).then_some(Class { revision: 3, max_instance: 1 })

@@ -18,6 +18,7 @@ fn the_identity_reads_as_the_device_says() {
         ("07", "03546F79"),
         ("08", "03"),
         ("09", "0000"),
+        ("0A", "00"),
     ] {
         bench.asks(&format!("0E 01 01 {attribute}"), &format!("8E {value}"));
     }
