@@ -163,7 +163,7 @@ impl Player {
             while let Some(result) = self.memory.done() {
                 self.kept(result, tell);
             }
-            let Some(kept) = self.device.keep() else { return };
+            let Some(kept) = self.device.keep(self.turns.clock().now()) else { return };
             if let Some(result) = self.memory.write(kept) {
                 self.kept(result, tell);
             }

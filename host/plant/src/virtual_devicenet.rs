@@ -182,11 +182,11 @@ impl VirtualDeviceNet {
         for place in 0..self.encoders.len() {
             let id = self.encoders[place].0;
             let due = matches!(
-                self.wire.node(id), Some(Node::Encoder(device)) if device.keep_due()
+                self.wire.node(id), Some(Node::Encoder(device)) if device.keep_due(now)
             );
             if due && let Some(Node::Encoder(device)) = self.wire.node_mut(id) {
                 // Volatile memory: what is kept stays in the device.
-                while device.keep().is_some() {
+                while device.keep(now).is_some() {
                     device.kept(now, Ok::<(), ()>(()));
                 }
             }
