@@ -3,7 +3,8 @@
 //! A [`Wire`] carries the frames of its stations as a real segment does: at bus idle the lowest
 //! identifier wins, a frame lasts exactly its bits with real stuffing, somebody has to acknowledge
 //! it, and only stations whose acceptance filters match see it. On top of that it loses and
-//! destroys frames on demand, names the station that breaks a rule, and counts.
+//! destroys frames and takes controllers off the bus on demand, names the station that breaks a
+//! rule, and counts.
 
 mod bits;
 mod candump;
@@ -16,6 +17,7 @@ mod schedule;
 mod script;
 mod statistics;
 mod takers;
+mod troubled;
 mod wire;
 
 pub use bits::frame_bits;
@@ -26,4 +28,5 @@ pub use faults::Faults;
 pub use rules::Rule;
 pub use script::Script;
 pub use statistics::Statistics;
+pub use troubled::{Drops, Troubled};
 pub use wire::{Node, NodeId, Wire};

@@ -5,6 +5,7 @@
 //! passes in minutes, and what went wrong once goes wrong again in the same way.
 //!
 //! - [`can::Wire`] joins stations to a CAN segment and steps from event to event.
+//! - [`can::Troubled`] drops what a station says, or lets it come late.
 //! - [`shaft::Shaft`] turns a line of text into raw codes for an encoder.
 //! - [`memory::TornMemory`] forgets the rest of a write when the power fails.
 //!

@@ -26,6 +26,8 @@ mod number;
 mod table;
 mod text;
 
+use std::path::Path;
+
 use codewheel_encoder::{Sample, Sensor};
 use codewheel_station::{Duration, Instant};
 
@@ -61,6 +63,13 @@ impl Shaft {
         revolutions: u32,
     ) -> Result<Self, ShaftError> {
         text::parse(text, singleturn_resolution, revolutions)
+    }
+
+    /// The text of a shaft in which a relative FILE of `csv` is meant from `folder`, as one that means
+    /// the same from anywhere the folder can be named. Other texts stay as they are.
+    #[must_use]
+    pub fn text_in_folder(text: &str, folder: &Path) -> String {
+        text::in_folder(text, folder)
     }
 
     /// The same shaft, whose motion begins at `at`; until then it rests at its first angle.

@@ -1,15 +1,25 @@
 //! The transmit error counter of a controller (ISO 11898-1, 12.1.4).
 
 /// How often a controller has failed to send, as the standard weighs it.
-///
-/// Bus-off, which begins above 255, is not modelled: the counter stops there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct TransmitErrors(u8);
+pub(super) struct TransmitErrors(u16);
+
+/// What one failure counts.
+const FAILURE: u16 = 8;
+/// From here on a controller is error-passive.
+const PASSIVE: u16 = 128;
+/// Above this it is bus-off.
+const LAST: u16 = 255;
 
 impl TransmitErrors {
-    /// A frame was destroyed or not acknowledged: eight more.
+    /// A frame was destroyed: eight more.
     pub(super) fn failed(&mut self) {
-        self.0 = self.0.saturating_add(8);
+        self.0 = self.0.saturating_add(FAILURE);
+    }
+
+    /// A frame was not acknowledged, which makes a controller error-passive and never bus-off.
+    pub(super) fn failed_at_most_passive(&mut self) {
+        self.0 = (self.0 + FAILURE).min(LAST).max(self.0);
     }
 
     /// A frame went out: one less.
@@ -19,7 +29,12 @@ impl TransmitErrors {
 
     /// Whether the controller is error-passive: its error flags no longer disturb others.
     pub(super) const fn passive(self) -> bool {
-        self.0 >= 128
+        self.0 >= PASSIVE
+    }
+
+    /// Whether the controller has to leave the bus.
+    pub(super) const fn bus_off(self) -> bool {
+        self.0 > LAST
     }
 }
 
@@ -36,7 +51,17 @@ mod tests {
         assert!(errors.passive());
         errors.succeeded();
         assert!(!errors.passive());
-        (0..100).for_each(|_| errors.failed());
-        assert!(errors.passive());
+    }
+
+    #[test]
+    fn thirty_two_failures_make_it_bus_off_and_want_of_an_acknowledge_never_does() {
+        let mut errors = TransmitErrors::default();
+        (0..1_000).for_each(|_| errors.failed_at_most_passive());
+        assert!(errors.passive() && !errors.bus_off());
+        let mut errors = TransmitErrors::default();
+        (0..31).for_each(|_| errors.failed());
+        assert!(!errors.bus_off());
+        errors.failed();
+        assert!(errors.bus_off());
     }
 }

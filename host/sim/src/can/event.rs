@@ -48,6 +48,20 @@ pub enum Event {
         /// The frame.
         frame: Frame,
     },
+    /// The controller of a station has left the bus.
+    BusOff {
+        /// When.
+        at: Instant,
+        /// The station.
+        station: NodeId,
+    },
+    /// The controller of a station takes part again after a bus-off.
+    Recovered {
+        /// When.
+        at: Instant,
+        /// The station.
+        station: NodeId,
+    },
     /// A station broke a rule.
     Violation {
         /// When it showed.
@@ -68,6 +82,8 @@ impl Event {
             | Self::Unacknowledged { at, .. }
             | Self::Corrupted { at, .. }
             | Self::Lost { at, .. }
+            | Self::BusOff { at, .. }
+            | Self::Recovered { at, .. }
             | Self::Violation { at, .. } => *at,
         }
     }
@@ -80,6 +96,8 @@ impl fmt::Display for Event {
             Self::Unacknowledged { at, frame, .. } => write!(f, "{at} {frame} unacknowledged"),
             Self::Corrupted { at, frame, .. } => write!(f, "{at} {frame} destroyed"),
             Self::Lost { at, frame, .. } => write!(f, "{at} {frame} lost by a receiver"),
+            Self::BusOff { at, .. } => write!(f, "{at} a station is bus-off"),
+            Self::Recovered { at, .. } => write!(f, "{at} a station takes part again"),
             Self::Violation { at, station, rule } => write!(f, "{at} {station} {rule}"),
         }
     }

@@ -15,6 +15,8 @@ pub struct Statistics {
     pub corrupted: u64,
     /// Frames that a station should have taken and did not see, counted for each station.
     pub lost: u64,
+    /// How often a controller left the bus.
+    pub bus_offs: u64,
     /// Rules broken.
     pub violations: u64,
     /// How long the wire was not idle: frames, error frames and their interframe spaces.

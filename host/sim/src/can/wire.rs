@@ -1,5 +1,6 @@
 //! The wire: who is on it, and what its owner can ask and change.
 
+mod bus_off;
 mod course;
 
 use std::fmt;
@@ -13,6 +14,7 @@ use super::errors::TransmitErrors;
 use super::schedule::{NEVER, Schedule};
 use super::takers::Takers;
 use super::{Event, Faults, Rule, Statistics};
+use bus_off::Off;
 
 /// A [`Station`] that speaks CAN. Every such station is one.
 pub trait Node: for<'a> Station<Input<'a> = Input<'a>, Output = Frame> {}
@@ -39,7 +41,10 @@ pub struct Wire<N> {
     bit_nanos: u64,
     now: u64,
     slots: Vec<Slot<N>>,
-    powered: usize,
+    /// How many stations are switched on and not bus-off: they acknowledge each other.
+    taking_part: usize,
+    /// The stations whose controllers have left the bus.
+    off: Vec<Off>,
     schedule: Schedule,
     takers: Takers,
     /// Slots to be asked for a frame at the next idle moment; [`Attached::asked`] holds them once.
@@ -71,6 +76,7 @@ struct Attached<N> {
     /// A controller does not take the rest of a frame that began before it.
     since: u64,
     loss: Option<f64>,
+    corruption: Option<f64>,
     mailbox: Option<Mail>,
     errors: TransmitErrors,
     /// Whether the slot is in [`Wire::asking`].
@@ -120,7 +126,8 @@ impl<N: Node> Wire<N> {
             bit_nanos: bit_rate.bit_nanos(),
             now: 0,
             slots: Vec::new(),
-            powered: 0,
+            taking_part: 0,
+            off: Vec::new(),
             schedule: Schedule::new(),
             takers: Takers::new(),
             asking: Vec::new(),
@@ -159,6 +166,7 @@ impl<N: Node> Wire<N> {
             terminated,
             since: self.now,
             loss: None,
+            corruption: None,
             mailbox: None,
             errors: TransmitErrors::default(),
             asked: false,
@@ -167,7 +175,7 @@ impl<N: Node> Wire<N> {
             turns: 0,
             turns_since: self.now,
         });
-        self.powered += 1;
+        self.taking_part += 1;
         self.takers.set(slot, filters);
         self.schedule.set(slot, self.now);
         NodeId { slot: slot as u32, generation: self.slots[slot].generation }
@@ -179,12 +187,16 @@ impl<N: Node> Wire<N> {
         let slot = self.slot_of(id)?;
         let node = self.slots[slot].node.take()?;
         self.slots[slot].generation = self.slots[slot].generation.wrapping_add(1);
-        self.powered -= 1;
+        if self.is_off(slot) {
+            self.off.retain(|off| off.slot != slot);
+        } else {
+            self.taking_part -= 1;
+        }
         self.takers.set(slot, &[]);
         self.schedule.set(slot, NEVER);
         self.asking.retain(|&asked| asked != slot);
         self.waiting.retain(|waiting| waiting.slot != slot);
-        self.lose_power(slot);
+        self.lose_sender(slot);
         Some(node.station)
     }
 
@@ -247,6 +259,35 @@ impl<N: Node> Wire<N> {
         }
     }
 
+    /// Gives one station its own probability that a frame it sends is destroyed, as a bad transceiver
+    /// does; `None` returns it to [`Faults::corruption`]. Unlike that one it takes the station off the
+    /// bus: each destroyed frame counts eight, each good one minus one, and above 255 its controller
+    /// is [bus-off](Self::bus_off). Does nothing for a station that is gone.
+    pub fn set_corruption_at(&mut self, id: NodeId, corruption: Option<f64>) {
+        if let Some(node) = self.attached_mut(id) {
+            node.corruption = corruption;
+        }
+    }
+
+    /// Lets the controller of a station leave the bus, as after too many errors: the station gets
+    /// [`Input::BusOff`], its mailbox is empty, and it neither hears, speaks nor acknowledges. A frame
+    /// it is just sending is destroyed. After 128 times 11 recessive bits, 2.8 ms on an idle wire at
+    /// 500k, it gets [`Input::Recovered`] and takes part again (ISO 11898-1, 12.1.4.4).
+    ///
+    /// Does nothing for a station that is gone or bus-off already.
+    pub fn bus_off(&mut self, id: NodeId, observer: &mut impl FnMut(&Event)) {
+        if let Some(slot) = self.slot_of(id) {
+            self.leave(slot, observer);
+            self.lose_sender(slot);
+        }
+    }
+
+    /// Whether the controller of a station is bus-off.
+    #[must_use]
+    pub fn is_bus_off(&self, id: NodeId) -> bool {
+        self.slot_of(id).is_some_and(|slot| self.is_off(slot))
+    }
+
     /// Holds all frames from now on against one more rule.
     pub fn add_rule(&mut self, rule: Rule) {
         self.rules.push(rule);
@@ -258,12 +299,12 @@ impl<N: Node> Wire<N> {
         Instant::from_nanos(self.now)
     }
 
-    /// When something happens next, not before [`now`](Self::now): a deadline, the end of a frame,
-    /// or now where a station was attached or changed. `None` where nothing will ever happen by
+    /// When something happens next, not before [`now`](Self::now): a deadline, the end of a frame, the
+    /// end of a bus-off, or now where a station was attached or changed. `None` where nothing will ever happen by
     /// itself.
     #[must_use]
     pub fn next_event(&self) -> Option<Instant> {
-        let next = self.schedule.earliest().min(self.phase_end);
+        let next = self.schedule.earliest().min(self.phase_end).min(self.next_recovery());
         (next != NEVER).then(|| Instant::from_nanos(next.max(self.now)))
     }
 

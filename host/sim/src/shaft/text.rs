@@ -1,7 +1,7 @@
 //! A shaft from its line of text.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use codewheel_station::{Duration, Instant};
 
@@ -202,15 +202,8 @@ impl Disc {
         Ok((Motion::Profile(profile), self.start(start)?))
     }
 
-    /// The file is everything up to `angle=`, which stands last: a path may contain blanks.
     fn csv(self, rest: &str) -> Parsed {
-        let (path, angle) = match rest.rsplit_once("angle=") {
-            Some((path, angle)) if path.is_empty() || path.ends_with(char::is_whitespace) => {
-                (path, Some(angle))
-            }
-            _ => (rest, None),
-        };
-        let path = path.trim();
+        let (path, angle) = file_and_angle(rest);
         if path.is_empty() {
             return Err(ShaftError::Missing { shaft: "csv", missing: "the name of its FILE" });
         }
@@ -226,6 +219,30 @@ impl Disc {
         number::angle(text, self.singleturn_resolution)
             .ok_or_else(|| value(text, what, number::AN_ANGLE))
     }
+}
+
+/// The file is everything up to `angle=`, which stands last: a path may contain blanks.
+fn file_and_angle(rest: &str) -> (&str, Option<&str>) {
+    let (path, angle) = match rest.rsplit_once("angle=") {
+        Some((path, angle)) if path.is_empty() || path.ends_with(char::is_whitespace) => {
+            (path, Some(angle))
+        }
+        _ => (rest, None),
+    };
+    (path.trim(), angle)
+}
+
+pub(super) fn in_folder(text: &str, folder: &Path) -> String {
+    let text = text.trim();
+    let Some(("csv", rest)) = text.split_once(char::is_whitespace) else {
+        return text.to_owned();
+    };
+    let (path, angle) = file_and_angle(rest);
+    if path.is_empty() {
+        return text.to_owned();
+    }
+    let angle = angle.map_or(String::new(), |angle| format!(" angle={angle}"));
+    format!("csv {}{angle}", folder.join(path).display())
 }
 
 /// The values of `keys` in `text`, words of the form key=value.

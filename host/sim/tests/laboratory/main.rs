@@ -2,6 +2,7 @@
 
 mod acknowledge;
 mod arbitration;
+mod bus_off;
 mod deadlines;
 mod faults;
 mod frame_length;
@@ -9,6 +10,7 @@ mod police;
 mod power;
 mod sensors;
 mod shafts;
+mod troubled;
 
 use codewheel_sim::can::{Event, Script, Wire, parse_frame};
 use codewheel_station::can::{BitRate, Filter, Frame};

@@ -22,6 +22,7 @@ impl<N: Node> Wire<N> {
         if self.phase_end <= self.now {
             self.end_phase(observer);
         }
+        self.recover(observer);
         while let Some(slot) = self.schedule.due(self.now) {
             self.advance(slot, observer);
         }
@@ -71,7 +72,8 @@ impl<N: Node> Wire<N> {
                 continue;
             };
             node.asked = false;
-            if node.stalled || node.mailbox.is_some() {
+            if node.stalled || node.mailbox.is_some() || self.off.iter().any(|off| off.slot == slot)
+            {
                 continue;
             }
             if std::mem::take(&mut node.overdue) {
@@ -97,7 +99,7 @@ impl<N: Node> Wire<N> {
         let Some(&slot) = self.senders.first() else {
             return;
         };
-        let acknowledged = self.powered > self.senders.len();
+        let acknowledged = self.taking_part > self.senders.len();
         if !acknowledged && self.senders.iter().all(|&slot| self.is_held(slot)) {
             return self.senders.clear();
         }
@@ -107,7 +109,7 @@ impl<N: Node> Wire<N> {
         let (frame, sequence) = (*frame, *sequence);
         let (bits, outcome) = if let Some(broken) = collision {
             (Sequence::destroyed_bits(broken), Outcome::Destroyed)
-        } else if faults::happens(&mut self.random, self.faults.corruption) {
+        } else if self.corrupts(slot) {
             let broken = self.random.u32(1..=sequence.stuffed());
             (Sequence::destroyed_bits(broken), Outcome::Destroyed)
         } else if acknowledged {
@@ -118,6 +120,11 @@ impl<N: Node> Wire<N> {
         let lasts = if outcome == Outcome::Delivered { bits - INTERFRAME_SPACE } else { bits };
         let from = self.id(slot);
         self.begin(Phase::Frame { frame, from, bits, outcome }, lasts);
+    }
+
+    fn corrupts(&mut self, slot: usize) -> bool {
+        let own = self.slots[slot].node.as_ref().and_then(|node| node.corruption);
+        faults::happens(&mut self.random, own.unwrap_or(self.faults.corruption))
     }
 
     /// Several stations send one identifier at the same moment. Where they send the same bits
@@ -178,6 +185,9 @@ impl<N: Node> Wire<N> {
     }
 
     fn begin(&mut self, phase: Phase, bits: u32) {
+        if matches!(phase, Phase::Frame { .. }) {
+            self.end_idle();
+        }
         self.phase = phase;
         self.phase_since = self.now;
         self.phase_end = self.now.saturating_add(u64::from(bits) * self.bit_nanos);
@@ -190,7 +200,7 @@ impl<N: Node> Wire<N> {
         let Phase::Frame { frame, from, bits, outcome } =
             std::mem::replace(&mut self.phase, Phase::Idle)
         else {
-            return;
+            return self.begin_idle();
         };
         let at = Instant::from_nanos(self.now);
         match outcome {
@@ -203,13 +213,15 @@ impl<N: Node> Wire<N> {
             }
             Outcome::Destroyed => {
                 self.counted.corrupted += 1;
-                self.fail(false);
                 observer(&Event::Corrupted { at, from, frame });
+                self.fail(false, observer);
+                self.begin_idle();
             }
             Outcome::Unacknowledged => {
                 self.counted.unacknowledged += 1;
-                self.fail(true);
                 observer(&Event::Unacknowledged { at, from, frame });
+                self.fail(true, observer);
+                self.begin_idle();
             }
         }
     }
@@ -252,6 +264,9 @@ impl<N: Node> Wire<N> {
         let Some(node) = self.slots[slot].node.as_ref().filter(|node| node.since <= since) else {
             return;
         };
+        if self.is_off(slot) {
+            return;
+        }
         let loss = node.loss.unwrap_or(self.faults.loss);
         if faults::happens(&mut self.random, loss) {
             self.counted.lost += 1;
@@ -261,7 +276,7 @@ impl<N: Node> Wire<N> {
         self.handle(slot, Input::Frame(frame));
     }
 
-    fn handle(&mut self, slot: usize, input: Input<'_>) {
+    pub(super) fn handle(&mut self, slot: usize, input: Input<'_>) {
         let Some(node) = self.slots[slot].node.as_mut() else {
             return;
         };
@@ -275,21 +290,31 @@ impl<N: Node> Wire<N> {
         self.schedule.set(slot, nanos(node.station.deadline()));
     }
 
-    fn fail(&mut self, unacknowledged: bool) {
-        for &slot in &self.senders {
+    fn fail(&mut self, unacknowledged: bool, observer: &mut impl FnMut(&Event)) {
+        for slot in std::mem::take(&mut self.senders) {
             let Some(node) = self.slots[slot].node.as_mut() else { continue };
-            node.errors.failed();
+            // Want of an acknowledge makes nobody bus-off, nor does the noise of the whole wire.
+            if !unacknowledged && node.corruption.is_some() {
+                node.errors.failed();
+            } else {
+                node.errors.failed_at_most_passive();
+            }
+            let too_many = node.errors.bus_off();
             if let Some(mail) = node.mailbox.as_mut() {
                 mail.unacknowledged |= unacknowledged;
+            }
+            if too_many {
+                self.leave(slot, observer);
             }
         }
     }
 
-    /// What the frame on the wire becomes when the station in `slot` has just lost power.
-    pub(super) fn lose_power(&mut self, slot: usize) {
+    /// What the frame on the wire becomes when the station in `slot` has just left the bus or lost
+    /// power.
+    pub(super) fn lose_sender(&mut self, slot: usize) {
         self.senders.retain(|&sender| sender != slot);
         let other_sender = self.senders.first().map(|&sender| self.id(sender));
-        let acknowledged = self.powered > self.senders.len();
+        let acknowledged = self.taking_part > self.senders.len();
         let Phase::Frame { outcome, from, .. } = &mut self.phase else {
             return;
         };
@@ -325,7 +350,7 @@ impl<N: Node> Wire<N> {
         observer(&Event::Violation { at, station, rule });
     }
 
-    fn id(&self, slot: usize) -> NodeId {
+    pub(super) fn id(&self, slot: usize) -> NodeId {
         NodeId { slot: slot as u32, generation: self.slots[slot].generation }
     }
 
