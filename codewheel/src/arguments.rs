@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use codewheel_device::{Product, product};
 use codewheel_link::BusUri;
+use codewheel_plant::TimeSpan;
 use codewheel_station::can::BitRate;
 
 /// An absolute rotary encoder made of software.
@@ -50,9 +51,40 @@ impl Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
+    Run(RunArguments),
     Encoder(EncoderArguments),
     Models(ModelsArguments),
     Describe(DescribeArguments),
+    /// Print the JSON Schema of plant files, for editors that complete and check them.
+    Schema,
+}
+
+/// Run a plant: buses, devices, shafts, memories, faults and masters from one TOML file.
+///
+/// On a terminal it shows a live table, elsewhere a line for each device and second. It ends with
+/// Ctrl-C or a termination, after the memories have taken what they are still to take.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel run examples/demo.toml
+  codewheel run examples/faults.toml --for 16s
+  codewheel run plant.toml --json | jq 'select(.lamp == \"red\")'
+  codewheel run plant.toml --print-config > complete.toml")]
+pub(crate) struct RunArguments {
+    /// The plant file; relative paths in it are meant from its folder
+    pub(crate) file: PathBuf,
+
+    /// End after this time, such as 3s, 500ms or 2m
+    #[arg(long = "for", value_name = "DURATION")]
+    pub(crate) lasts: Option<TimeSpan>,
+
+    /// Print the complete plant, every default filled in, and run nothing
+    #[arg(long)]
+    pub(crate) print_config: bool,
+
+    /// One JSON object a line, for each device and second
+    #[arg(long, conflicts_with = "print_config")]
+    pub(crate) json: bool,
 }
 
 /// Play one encoder on a bus until Ctrl-C.

@@ -4,7 +4,7 @@ use std::io;
 use std::process::ExitCode;
 
 use codewheel_link::LinkError;
-use codewheel_plant::{MemoryError, PlayError};
+use codewheel_plant::{MemoryError, PlantError, StartError};
 use codewheel_sim::shaft::ShaftError;
 use thiserror::Error;
 
@@ -14,11 +14,11 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Shaft(#[from] ShaftError),
     #[error(transparent)]
-    Play(#[from] PlayError),
+    Plant(#[from] PlantError),
+    #[error(transparent)]
+    Start(#[from] StartError),
     #[error(transparent)]
     Link(#[from] LinkError),
-    #[error("{0}")]
-    Plant(String),
     #[error("cannot write to stdout: {0}")]
     Output(#[from] io::Error),
     #[error("cannot catch Ctrl-C: {0}")]
@@ -26,13 +26,22 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
+    /// Whether nobody reads us any more: `codewheel | head` is a clean end.
+    pub(crate) fn is_closed_pipe(&self) -> bool {
+        matches!(self, Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
+    }
+
     /// 2 for usage, 3 for bus or I/O.
     pub(crate) fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::Shaft(_)
-            | Self::Plant(_)
-            | Self::Play(PlayError::Memory(MemoryError::AnotherProduct { .. })) => 2,
-            Self::Play(_) | Self::Link(_) | Self::Output(_) | Self::Signals(_) => 3,
+            | Self::Plant(PlantError::Wrong(_))
+            | Self::Start(StartError::Memory(MemoryError::AnotherProduct { .. })) => 2,
+            Self::Plant(PlantError::Read { .. })
+            | Self::Start(_)
+            | Self::Link(_)
+            | Self::Output(_)
+            | Self::Signals(_) => 3,
         })
     }
 }

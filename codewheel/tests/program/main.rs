@@ -4,3 +4,6 @@ mod demo;
 mod encoder;
 mod prompt;
 mod refusals;
+mod run;
+#[cfg(unix)]
+mod terminal;

@@ -18,10 +18,15 @@ pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// The path of an example plant.
+pub(crate) fn example(name: &str) -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples").join(name)
+}
+
 /// The program while it runs; killed when dropped.
 pub(crate) struct Running {
     child: Child,
-    out: BufReader<ChildStdout>,
+    out: Option<BufReader<ChildStdout>>,
 }
 
 impl Running {
@@ -33,7 +38,7 @@ impl Running {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the program starts");
-        let out = BufReader::new(child.stdout.take().expect("a pipe"));
+        let out = child.stdout.take().map(BufReader::new);
         Self { child, out }
     }
 
@@ -47,10 +52,28 @@ impl Running {
         (running, address.to_owned())
     }
 
+    /// The next line of its stderr.
+    pub(crate) fn message(&mut self) -> String {
+        let err = self.child.stderr.as_mut().expect("a pipe");
+        let mut line = Vec::new();
+        let mut octet = [0];
+        // Octet by octet, so that what follows is still there for `end`.
+        while err.read(&mut octet).expect("stderr") == 1 && octet != *b"\n" {
+            line.push(octet[0]);
+        }
+        String::from_utf8(line).expect("stderr is text")
+    }
+
+    /// Closes our end of its stdout.
+    pub(crate) fn close_stdout(&mut self) {
+        self.out = None;
+    }
+
     /// The next line of its stdout.
     pub(crate) fn line(&mut self) -> String {
         let mut line = String::new();
-        self.out.read_line(&mut line).expect("stdout");
+        let out = self.out.as_mut().expect("stdout is open");
+        out.read_line(&mut line).expect("stdout");
         line.trim_end().to_owned()
     }
 

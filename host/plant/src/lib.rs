@@ -1,17 +1,35 @@
-//! Buses, devices, shafts and masters together, running: snapshots come out.
+//! Buses, devices, shafts, masters and faults together, running: snapshots come out.
 //!
-//! Two ways to run an encoder: [`Player`] plays one on a real port, [`VirtualDeviceNet`] keeps a
-//! whole segment of them on a simulated wire, paced by the clock on the wall. [`MemoryFile`] is the
-//! non-volatile memory of either.
+//! A [`Plant`] comes from a TOML file, [`Plant::load`], and [`Plant::start`] lets it run by the clock
+//! on the wall, each bus in a thread of its own. A single bus is a [`VirtualBus`] on a simulated wire
+//! in virtual time, or a [`PortBus`] on a real port; a [`MemoryFile`] is the non-volatile memory of a
+//! device on either. What goes wrong, and when, stands in the file: [`Fault`].
 
-mod demo;
+mod check;
+mod complaint;
+mod composite;
+mod crew;
+mod device;
+mod fault;
+mod file;
+mod keeper;
 mod memory;
-mod player;
-mod virtual_devicenet;
+mod plant;
+mod port_bus;
+mod print;
+mod report;
+mod running;
+mod time_span;
+mod virtual_bus;
 
-pub use demo::demo;
+pub use complaint::{Complaint, PlantError};
+pub use crew::{BusSnapshot, DeviceSnapshot, MasterSnapshot, SlaveSnapshot};
+pub use fault::{Fault, Lever};
+pub use file::schema;
 pub use memory::{Found, MemoryError, MemoryFile};
-pub use player::{PlayError, Player, PlayerSettings, Report};
-pub use virtual_devicenet::{
-    EncoderSettings, EncoderSnapshot, Running, SegmentSettings, SegmentSnapshot, VirtualDeviceNet,
-};
+pub use plant::{BusPlan, DevicePlan, MasterPlan, Plant, SlavePlan};
+pub use port_bus::{PortBus, StartError};
+pub use report::{Report, What};
+pub use running::Running;
+pub use time_span::{NoTimeSpan, TimeSpan};
+pub use virtual_bus::VirtualBus;

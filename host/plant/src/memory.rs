@@ -17,7 +17,7 @@ use thiserror::Error;
 pub enum MemoryError {
     /// The file cannot be opened, read or written.
     #[error("cannot {attempt} the memory file {}: {reason}; name a file that can be read and \
-             written, or leave --memory out", .path.display())]
+             written, or leave the memory out", .path.display())]
     Io {
         /// What was tried.
         attempt: &'static str,

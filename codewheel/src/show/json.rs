@@ -1,0 +1,111 @@
+//! One JSON object a line, for each device and second, and for each bus that has something to tell.
+
+use std::io::{self, Write};
+
+use codewheel_plant::{BusSnapshot, DeviceSnapshot, Report};
+use serde::Serialize;
+
+use super::{Show, connection, cycle_ms, fresh, lamp, rpm};
+
+pub(super) struct Json;
+
+/// A device at one moment. What is `null` is not known: without power, without a master here.
+#[derive(Serialize)]
+struct Line<'a> {
+    /// Seconds since the start.
+    at: f64,
+    bus: &'a str,
+    uri: &'a str,
+    device: &'a str,
+    address: u8,
+    model: &'a str,
+    product: &'a str,
+    position: Option<u32>,
+    turns: Option<u32>,
+    /// Steps a second.
+    speed: Option<i64>,
+    rpm: Option<f64>,
+    alarm: Option<bool>,
+    warning: Option<bool>,
+    lamp: String,
+    connection: &'a str,
+    polls_per_second: Option<f64>,
+    cycle_ms: Option<f64>,
+    bus_load: Option<f64>,
+    events: Vec<Event>,
+}
+
+/// What happened on a bus itself.
+#[derive(Serialize)]
+struct BusLine<'a> {
+    at: f64,
+    bus: &'a str,
+    uri: &'a str,
+    events: Vec<Event>,
+}
+
+#[derive(Serialize)]
+struct Event {
+    at: f64,
+    trouble: bool,
+    text: String,
+}
+
+impl Show for Json {
+    fn draw(&mut self, newest: &[Option<BusSnapshot>], places: &[usize]) -> io::Result<()> {
+        let mut out = io::stdout().lock();
+        for bus in fresh(newest, places) {
+            for device in &bus.devices {
+                write(&mut out, &line(bus, device))?;
+            }
+            if !bus.reports.is_empty() {
+                let (at, events) = (seconds(bus.at), events(&bus.reports));
+                write(&mut out, &BusLine { at, bus: &bus.name, uri: &bus.uri, events })?;
+            }
+        }
+        out.flush()
+    }
+}
+
+fn write(out: &mut impl Write, line: &impl Serialize) -> io::Result<()> {
+    let text = serde_json::to_string(line).map_err(io::Error::from)?;
+    writeln!(out, "{text}")
+}
+
+fn events(reports: &[Report]) -> Vec<Event> {
+    let event = |report: &Report| Event {
+        at: seconds(report.at),
+        trouble: report.what.is_trouble(),
+        text: report.what.to_string(),
+    };
+    reports.iter().map(event).collect()
+}
+
+fn seconds(at: codewheel_station::Instant) -> f64 {
+    at.as_nanos() as f64 / 1e9
+}
+
+fn line<'a>(bus: &'a BusSnapshot, device: &'a DeviceSnapshot) -> Line<'a> {
+    let snapshot = device.device.as_ref();
+    Line {
+        at: seconds(bus.at),
+        bus: &bus.name,
+        uri: &bus.uri,
+        device: &device.name,
+        address: device.address,
+        model: device.product.model,
+        product: device.product.title,
+        position: snapshot.map(|device| device.position),
+        turns: snapshot.map(codewheel_device::Snapshot::turns),
+        speed: snapshot.map(|device| device.velocity),
+        rpm: snapshot.map(rpm),
+        alarm: snapshot.map(|device| device.alarm),
+        warning: snapshot.map(|device| device.warning),
+        lamp: lamp(device),
+        connection: connection(device),
+        polls_per_second: device.master.as_ref().map(|master| master.answers_per_second),
+        cycle_ms: cycle_ms(device),
+        bus_load: bus.load,
+        events: events(&device.reports),
+    }
+}

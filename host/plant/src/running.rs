@@ -1,0 +1,213 @@
+//! A plant that runs by the clock on the wall, each bus in a thread of its own.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time;
+
+use codewheel_link::{Clock, LinkError, Waker};
+use codewheel_station::Duration;
+
+use crate::crew::{BusSnapshot, Manned, is_virtual};
+use crate::port_bus::open;
+use crate::report::prepend;
+use crate::{Plant, PortBus, StartError, VirtualBus};
+
+/// How often a virtual bus catches up with the clock on the wall.
+const PACE: time::Duration = time::Duration::from_millis(5);
+
+/// A plant that runs. Dropping it stops it and lets its memories finish.
+#[derive(Debug)]
+pub struct Running {
+    shared: Arc<Shared>,
+    uris: Vec<String>,
+    wakers: Vec<Waker>,
+    threads: Vec<JoinHandle<Result<(), LinkError>>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    newest: Mutex<Newest>,
+    changed: Condvar,
+    stop: AtomicBool,
+}
+
+/// The newest snapshot of each bus that has not been fetched.
+#[derive(Debug, Default)]
+struct Newest {
+    snapshots: Vec<Option<BusSnapshot>>,
+    /// A bus has ended by itself.
+    ended: bool,
+}
+
+impl Plant {
+    /// Opens all memory files, then all ports, switches everything on and lets it run by the clock
+    /// on the wall, with a snapshot of each bus every `period`.
+    ///
+    /// # Errors
+    /// [`StartError`]; nothing is left half started.
+    pub fn start(self, period: time::Duration) -> Result<Running, StartError> {
+        let manned: Vec<Manned> =
+            self.buses.into_iter().map(Manned::open).collect::<Result<_, _>>()?;
+        let mut ports = Vec::new();
+        for Manned { plan, .. } in &manned {
+            let real = !is_virtual(&plan.uri);
+            ports.push(real.then(|| open(&plan.uri, plan.bit_rate)).transpose()?);
+        }
+        let clock = Clock::new();
+        let shared = Arc::new(Shared::default());
+        shared.lock().snapshots.resize_with(manned.len(), || None);
+        let period = period.into();
+        let (mut uris, mut wakers, mut threads) = (Vec::new(), Vec::new(), Vec::new());
+        for (place, (manned, port)) in manned.into_iter().zip(ports).enumerate() {
+            let post = Post { shared: Arc::clone(&shared), place, clock, period };
+            threads.push(match port {
+                None => {
+                    uris.push(manned.plan.uri.to_string());
+                    let bus = VirtualBus::begin(manned);
+                    std::thread::spawn(move || {
+                        post.run_virtual(bus);
+                        Ok(())
+                    })
+                }
+                Some(port) => {
+                    let bus = PortBus::begin(manned, port, clock);
+                    uris.push(bus.uri().to_owned());
+                    wakers.push(bus.waker());
+                    std::thread::spawn(move || post.run_port(bus))
+                }
+            });
+        }
+        Ok(Running { shared, uris, wakers, threads })
+    }
+}
+
+/// Where the thread of a bus leaves its snapshots.
+struct Post {
+    shared: Arc<Shared>,
+    place: usize,
+    clock: Clock,
+    period: Duration,
+}
+
+impl Post {
+    fn stopped(&self) -> bool {
+        self.shared.stop.load(Ordering::Relaxed)
+    }
+
+    fn run_virtual(&self, mut bus: VirtualBus) {
+        let mut next = self.clock.now();
+        while !self.stopped() {
+            let now = self.clock.now();
+            bus.run_until(now, &mut |_| {});
+            if now >= next {
+                next = now + self.period;
+                self.leave(bus.snapshot());
+            }
+            std::thread::sleep(PACE);
+        }
+        bus.finish();
+        self.leave(bus.snapshot());
+    }
+
+    fn run_port(&self, mut bus: PortBus) -> Result<(), LinkError> {
+        let mut next = self.clock.now();
+        let mut result = Ok(());
+        while !self.stopped() && result.is_ok() {
+            result = bus.turn(Some(next));
+            let now = self.clock.now();
+            if now >= next {
+                next = now + self.period;
+                self.leave(bus.snapshot());
+            }
+        }
+        bus.finish();
+        self.leave(bus.snapshot());
+        if result.is_err() {
+            self.shared.lock().ended = true;
+            self.shared.changed.notify_all();
+        }
+        result
+    }
+
+    fn leave(&self, mut snapshot: BusSnapshot) {
+        let mut newest = self.shared.lock();
+        let Some(place) = newest.snapshots.get_mut(self.place) else { return };
+        if let Some(older) = place.take() {
+            keep_reports(older, &mut snapshot);
+        }
+        *place = Some(snapshot);
+        self.shared.changed.notify_all();
+    }
+}
+
+/// The newest snapshot wins, but what happened before it is told all the same.
+fn keep_reports(older: BusSnapshot, newer: &mut BusSnapshot) {
+    prepend(older.reports, &mut newer.reports);
+    for (older, newer) in older.devices.into_iter().zip(&mut newer.devices) {
+        prepend(older.reports, &mut newer.reports);
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Newest> {
+        // A poisoned lock means that the other thread has panicked; its last state is still whole.
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Running {
+    /// Where each bus is, in the order of the plan, with the port it really got.
+    #[must_use]
+    pub fn uris(&self) -> &[String] {
+        &self.uris
+    }
+
+    /// Waits for snapshots that have not been fetched, at most for `patience`: of each bus the
+    /// newest, if there is one, in the order of the plan.
+    #[must_use]
+    pub fn snapshots(&self, patience: time::Duration) -> Vec<(usize, BusSnapshot)> {
+        let nothing =
+            |newest: &mut Newest| !newest.ended && newest.snapshots.iter().all(Option::is_none);
+        let newest = self.shared.lock();
+        let (mut newest, _) = self
+            .shared
+            .changed
+            .wait_timeout_while(newest, patience, nothing)
+            .unwrap_or_else(PoisonError::into_inner);
+        let snapshots = newest.snapshots.iter_mut().enumerate();
+        snapshots.filter_map(|(place, snapshot)| Some((place, snapshot.take()?))).collect()
+    }
+
+    /// Whether a bus was lost; [`stop`](Self::stop) says why.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.shared.lock().ended
+    }
+
+    /// Stops all buses, lets the memories finish, and gives what is left to tell.
+    ///
+    /// # Errors
+    /// [`LinkError`] where a bus was lost.
+    pub fn stop(mut self) -> (Vec<(usize, BusSnapshot)>, Result<(), LinkError>) {
+        let result = self.join();
+        (self.snapshots(time::Duration::ZERO), result)
+    }
+
+    fn join(&mut self) -> Result<(), LinkError> {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        self.wakers.iter().for_each(Waker::wake);
+        let mut result = Ok(());
+        for thread in self.threads.drain(..) {
+            // A thread that panicked has said so.
+            result = result.and(thread.join().unwrap_or(Ok(())));
+        }
+        result
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.join();
+    }
+}

@@ -1,0 +1,51 @@
+//! Plants as their users meet them: files, faults, ports.
+
+mod complaints;
+mod examples;
+mod faults;
+mod one_port;
+mod power_cuts;
+mod running;
+
+use std::path::{Path, PathBuf};
+
+use codewheel_plant::{BusPlan, BusSnapshot, DeviceSnapshot, Plant, VirtualBus};
+use codewheel_station::{Duration, Instant};
+
+/// The plant that `text` describes.
+#[track_caller]
+fn plant(text: &str) -> Plant {
+    Plant::parse(text, "plant.toml", Path::new(""))
+        .unwrap_or_else(|complaint| panic!("{complaint}"))
+}
+
+/// Its only bus.
+#[track_caller]
+fn only_bus(plant: Plant) -> BusPlan {
+    let [bus] = <[BusPlan; 1]>::try_from(plant.buses).expect("one bus");
+    bus
+}
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(name)
+}
+
+fn millis(millis: u64) -> Instant {
+    Instant::ZERO + Duration::from_millis(millis)
+}
+
+/// Runs a bus and gives its snapshot.
+fn at(bus: &mut VirtualBus, millis_from_start: u64) -> BusSnapshot {
+    bus.run_until(millis(millis_from_start), &mut |_| {});
+    bus.snapshot()
+}
+
+#[track_caller]
+fn device<'a>(snapshot: &'a BusSnapshot, name: &str) -> &'a DeviceSnapshot {
+    snapshot.devices.iter().find(|device| device.name == name).expect("the device")
+}
+
+/// What a device has reported.
+fn told(snapshot: &BusSnapshot, name: &str) -> Vec<String> {
+    device(snapshot, name).reports.iter().map(|report| report.what.to_string()).collect()
+}
