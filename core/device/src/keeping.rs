@@ -265,9 +265,20 @@ impl Keeping {
         if good { Outcome::Saved { answer } } else { Outcome::Failed { answer } }
     }
 
+    /// The power was cycled: nobody waits any more, and a Save whose record has not been fetched is
+    /// gone like every other setting that was not kept.
+    pub(crate) fn power_cycled(&mut self) {
+        self.answer_by = Deadline::NEVER;
+        if self.writing != Writing::Save {
+            self.save = None;
+        }
+    }
+
     /// Whether the newest Save has waited for too long; then it is to be answered as failed, and is
     /// off where its record has not even been fetched.
     pub(crate) fn overdue(&mut self, now: Instant) -> bool {
+        // From here on the record waits to be fetched, like any other.
+        self.retry_at.take_due(now);
         let overdue = self.answer_by.take_due(now);
         if overdue && self.writing != Writing::Save {
             self.save = None;

@@ -253,6 +253,28 @@ impl Sending {
         matches!(self.phase, Phase::Whole | Phase::Owed { .. })
     }
 
+    /// Whether a piece of the body has been handed out.
+    #[must_use]
+    pub const fn has_begun(&self) -> bool {
+        match self.phase {
+            Phase::Whole => false,
+            Phase::Owed { retried: false } => self.offset > 0,
+            Phase::Idle | Phase::Owed { retried: true } | Phase::Waiting { .. } => true,
+        }
+    }
+
+    /// Whether all of the body has been handed out; its last fragment may be unacknowledged.
+    #[must_use]
+    pub const fn is_all_out(&self) -> bool {
+        match self.phase {
+            Phase::Idle => true,
+            Phase::Whole | Phase::Owed { retried: false } => false,
+            Phase::Owed { retried: true } | Phase::Waiting { .. } => {
+                self.offset as usize + EXPLICIT_OCTETS >= self.length as usize
+            }
+        }
+    }
+
     /// The next piece of the body at the beginning of `buffer`, the same one that
     /// [`begin`](Sending::begin) was told the length of.
     pub fn next<'a>(&mut self, now: Instant, buffer: &'a [u8]) -> Option<Piece<'a>> {

@@ -3,7 +3,7 @@
 use codewheel_device::{Product, Snapshot};
 use codewheel_devicenet::MacId;
 use codewheel_devicenet::scanner::{
-    CycleTimes, Scanner, ScannerIdentity, SlaveSettings, SlaveState,
+    CycleTimes, DeviceIdentity, PollSettings, Scanner, ScannerIdentity, SlaveSettings, SlaveState,
 };
 use codewheel_link::BusUri;
 use codewheel_station::can::{BitRate, Filter, Frame, Input};
@@ -429,9 +429,13 @@ fn scanner(plan: &MasterPlan, place: usize) -> Scanner {
     for slave in &plan.slaves {
         // A plan has no address twice, so there are never too many.
         let _ = scanner.add(SlaveSettings {
-            expected_packet_rate: slave.expected_packet_rate,
-            assembly: slave.assembly,
-            identity: slave.identity,
+            poll: Some(PollSettings {
+                expected_packet_rate: slave.expected_packet_rate,
+                assembly: slave.assembly,
+            }),
+            identity: slave
+                .identity
+                .map(|(vendor, product_code)| DeviceIdentity { vendor, product_code }),
             ..SlaveSettings::poll(slave.mac)
         });
     }

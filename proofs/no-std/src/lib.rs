@@ -77,7 +77,7 @@ fn scanner(input: &[u8], sum: &mut Sum) {
             scanner.response(ticket, |response| match response {
                 Response::Done(data) => sum.add(data),
                 Response::Refused(error) => sum.add(&[error.general.0, error.additional]),
-                Response::NoAnswer => {}
+                Response::TooLong | Response::NoAnswer => {}
             });
         }
         if let Some(slave) = scanner.slave(mac) {

@@ -124,6 +124,7 @@ impl<S: Sensor> Body<S> {
         let model = self.product.encoder;
         self.encoder = Encoder::power_up(model, self.keeping.saved, self.keeping.reference())
             .unwrap_or_else(|_| Encoder::with_defaults(model));
+        self.keeping.power_cycled();
         self.produce_anyway = true;
         self.wake(now);
     }

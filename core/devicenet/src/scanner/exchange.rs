@@ -1,4 +1,14 @@
 //! One explicit request to a slave and its response, fragmented both ways where needed.
+//!
+//! The octets live with whoever asks, in a [`Question`]; the exchange keeps the state and the
+//! timers, which are these:
+//!
+//! | while | the exchange is given up after |
+//! |---|---|
+//! | request fragments go out | one second without the acknowledge, twice |
+//! | the response has not begun | the patience of the question, once all of it was sent |
+//! | response fragments come in | [`FRAGMENT_TIME`] without a new one |
+//! | anything at all | [`EXCHANGE_TIME`] and the patience, from the first frame |
 
 use codewheel_station::can::Frame;
 use codewheel_station::{Deadline, Duration, Instant};
@@ -6,18 +16,21 @@ use codewheel_station::{Deadline, Duration, Instant};
 use crate::MacId;
 use crate::explicit::{Error, GeneralStatus, Header, Service};
 use crate::fragment::{
-    Fragment, Kind, Piece, Reassembly, Received, STATUS_OK, STATUS_TOO_MUCH_DATA, Sending,
+    FIRST_AND_ONLY, Fragment, Kind, Piece, Reassembly, Received, STATUS_OK, STATUS_TOO_MUCH_DATA,
+    Sending,
 };
 use crate::identifier::{EXPLICIT_REQUEST, UNCONNECTED_REQUEST, group_2};
 
-/// The longest request body.
-pub(super) const REQUEST_OCTETS: usize = 64;
-/// The longest response body.
-const RESPONSE_OCTETS: usize = 256;
-
 /// How long a slave may take to answer. A slave that writes its memory first takes up to 5 s, so
 /// whoever asks for that waits longer.
-pub(super) const ANSWER_TIME: Duration = Duration::from_millis(500);
+pub const ANSWER_TIME: Duration = Duration::from_millis(500);
+
+/// How long the next fragment of a response may take: the slave repeats one after a second, once.
+const FRAGMENT_TIME: Duration = Duration::from_millis(2_500);
+/// The most an exchange may take besides the patience.
+const EXCHANGE_TIME: Duration = Duration::from_secs(30);
+/// How long a frame that was handed out may wait for the medium, where nobody reports it as sent.
+const HANDED_TIME: Duration = Duration::from_secs(1);
 
 /// Which port of the slave a request goes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,26 +41,87 @@ pub(super) enum Port {
     Connected,
 }
 
+/// A request body, and room for what comes back.
+#[derive(Clone, Debug)]
+pub(super) struct Question<const REQUEST: usize, const RESPONSE: usize> {
+    body: [u8; REQUEST],
+    length: u8,
+    pub(super) port: Port,
+    pub(super) patience: Duration,
+    response: Reassembly<RESPONSE>,
+}
+
+impl<const REQUEST: usize, const RESPONSE: usize> Question<REQUEST, RESPONSE> {
+    pub(super) const fn new() -> Self {
+        const { assert!(REQUEST <= u8::MAX as usize, "lengths are kept in 8 bits") };
+        Self {
+            body: [0; REQUEST],
+            length: 0,
+            port: Port::Unconnected,
+            patience: ANSWER_TIME,
+            response: Reassembly::new(),
+        }
+    }
+
+    /// Keeps `body`, at most `REQUEST` octets long.
+    pub(super) fn ask(&mut self, port: Port, body: &[u8], patience: Duration) {
+        for (to, from) in self.body.iter_mut().zip(body) {
+            *to = *from;
+        }
+        self.length = body.len().min(REQUEST) as u8;
+        self.port = port;
+        self.patience = patience;
+        self.response.clear();
+    }
+
+    /// What the slave answered, once the exchange has ended with an answer.
+    pub(super) fn answer(&self) -> Answer<'_> {
+        match self.response.body() {
+            [0x94, general, rest @ ..] => Answer::Refused(Error {
+                general: GeneralStatus(*general),
+                additional: rest.first().copied().unwrap_or(0xFF),
+            }),
+            [_, data @ ..] => Answer::Done(data),
+            [] => Answer::Done(&[]),
+        }
+    }
+}
+
+/// What a slave answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer<'a> {
+    /// It did it; the data behind the service octet.
+    Done(&'a [u8]),
+    /// It refused.
+    Refused(Error),
+}
+
+/// How an exchange ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ended {
+    /// The response has arrived.
+    Answered,
+    /// The response does not fit its room.
+    TooLong,
+    /// Nothing came back in time.
+    Silent,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Idle,
     /// The request is on its way or its response is waited for.
     Asking,
-    /// The response has arrived.
-    Answered,
-    /// Nothing came back in time.
-    Silent,
+    Ended(Ended),
 }
 
-/// How an exchange ended.
+/// The acknowledge of one fragment, with the header and the port of the exchange it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Outcome<'a> {
-    /// The slave did it; the data behind the service octet.
-    Done(&'a [u8]),
-    /// The slave refused.
-    Refused(Error),
-    /// Nothing came back in time.
-    NoAnswer,
+struct Acknowledge {
+    port: Port,
+    header: Header,
+    count: u8,
+    status: u8,
 }
 
 #[derive(Clone, Debug)]
@@ -56,13 +130,21 @@ pub(super) struct Exchange {
     header: Header,
     port: Port,
     state: State,
-    request: [u8; REQUEST_OCTETS],
+    /// The service asked for.
+    service: u8,
     sending: Sending,
-    acknowledge: Option<(u8, u8)>,
-    response: Reassembly<RESPONSE_OCTETS>,
+    /// Outlives the exchange it belongs to.
+    acknowledge: Option<Acknowledge>,
+    /// The acknowledge of the last fragment of the last response: when the fragment comes again,
+    /// the acknowledge got lost.
+    last: Option<Acknowledge>,
+    /// How much of the response there is.
+    collected: u16,
     patience: Duration,
-    /// When the slave counts as silent, while something is waited for.
+    /// When the slave counts as silent, while it is its turn.
     silent_at: Deadline,
+    /// When the exchange has taken too long altogether.
+    ends_at: Deadline,
 }
 
 impl Exchange {
@@ -72,147 +154,242 @@ impl Exchange {
             header: Header(master.value()),
             port: Port::Unconnected,
             state: State::Idle,
-            request: [0; REQUEST_OCTETS],
+            service: 0,
             sending: Sending::IDLE,
             acknowledge: None,
-            response: Reassembly::new(),
+            last: None,
+            collected: 0,
             patience: ANSWER_TIME,
             silent_at: Deadline::NEVER,
+            ends_at: Deadline::NEVER,
         }
     }
 
-    /// Begins to send `body`, at most [`REQUEST_OCTETS`] long; what was on its way is given up.
-    pub(super) fn begin(&mut self, port: Port, body: &[u8], patience: Duration) {
-        self.port = port;
+    /// Begins to send `question`; what was on its way is given up, but for an acknowledge owed.
+    pub(super) fn begin<const REQUEST: usize, const RESPONSE: usize>(
+        &mut self,
+        question: &mut Question<REQUEST, RESPONSE>,
+    ) {
+        self.stop();
         self.header = self.header.of_next_transaction();
-        for (to, from) in self.request.iter_mut().zip(body) {
-            *to = *from;
-        }
-        self.sending.begin(body.len().min(REQUEST_OCTETS) as u16);
-        self.response.clear();
-        self.acknowledge = None;
-        self.patience = patience;
-        self.silent_at = Deadline::NEVER;
+        self.port = question.port;
+        self.patience = question.patience;
+        self.service = question.body.first().copied().unwrap_or_default();
+        self.sending.begin(u16::from(question.length));
+        question.response.clear();
+        self.collected = 0;
         self.state = State::Asking;
     }
 
-    /// Gives up whatever is going on.
-    pub(super) fn stop(&mut self) {
+    /// Gives up whatever is going on, but for an acknowledge owed: without it the slave would
+    /// repeat itself, and give up what we have long had.
+    pub(super) const fn stop(&mut self) {
         self.state = State::Idle;
         self.sending.stop();
-        self.acknowledge = None;
         self.silent_at = Deadline::NEVER;
+        self.ends_at = Deadline::NEVER;
+    }
+
+    /// Forgets acknowledges, too: the slave or the bus is gone.
+    pub(super) const fn forget(&mut self) {
+        self.stop();
+        self.acknowledge = None;
+        self.last = None;
+    }
+
+    pub(super) fn is_idle(&self) -> bool {
+        self.state == State::Idle
+    }
+
+    /// How the exchange ended, or `None` while it has not. Call [`stop`](Self::stop) when it has
+    /// been seen.
+    pub(super) const fn ended(&self) -> Option<Ended> {
+        match self.state {
+            State::Ended(ended) => Some(ended),
+            State::Idle | State::Asking => None,
+        }
     }
 
     /// An explicit response of the slave, without its header octet.
-    pub(super) fn heard(&mut self, now: Instant, header: Header, rest: &[u8]) {
+    pub(super) fn heard<const REQUEST: usize, const RESPONSE: usize>(
+        &mut self,
+        now: Instant,
+        header: Header,
+        rest: &[u8],
+        question: &mut Question<REQUEST, RESPONSE>,
+    ) {
+        if header.mac() != self.header.mac() {
+            return;
+        }
+        let ours = self.state == State::Asking && header.transaction() == self.header.transaction();
+        let response = &mut question.response;
+        if !header.fragmented() {
+            if ours && rest.first().is_some_and(|service| self.answers(*service)) {
+                response.clear();
+                let only = Fragment { kind: Kind::First, count: FIRST_AND_ONLY };
+                response.push(only, rest);
+                self.end(Ended::Answered);
+            }
+            return;
+        }
+        let [octet, octets @ ..] = rest else { return };
+        let fragment = Fragment::from_octet(*octet);
+        match (fragment.kind, octets) {
+            (_, []) => {}
+            (Kind::Acknowledge, [status, ..]) => {
+                if ours {
+                    self.acknowledged(now, fragment.count, *status);
+                }
+            }
+            _ if ours && self.sending.is_all_out() => {
+                self.collect(now, header, fragment, octets, response);
+            }
+            _ => {
+                if self
+                    .last
+                    .is_some_and(|last| last.header == header && last.count == fragment.count)
+                    && is_last(fragment)
+                {
+                    self.acknowledge = self.last;
+                }
+            }
+        }
+    }
+
+    /// Whether a response with `service` can be the one to our request, as far as a transaction
+    /// identifier of one bit allows to say. A refusal may come before all of the request is out.
+    const fn answers(&self, service: u8) -> bool {
+        (service == Service::ERROR.response() && self.sending.has_begun())
+            || (service == Service(self.service).response() && self.sending.is_all_out())
+    }
+
+    fn acknowledged(&mut self, now: Instant, count: u8, status: u8) {
+        if self.sending.is_idle() {
+            return;
+        }
+        self.sending.acknowledged(count, status);
+        if self.sending.is_idle() {
+            // All of it has arrived, or the slave has no room for it and will say so.
+            self.silent_at = Deadline::at(now + self.patience);
+        }
+    }
+
+    fn collect<const RESPONSE: usize>(
+        &mut self,
+        now: Instant,
+        header: Header,
+        fragment: Fragment,
+        octets: &[u8],
+        response: &mut Reassembly<RESPONSE>,
+    ) {
+        let received = response.push(fragment, octets);
+        let status = match received {
+            Received::Dropped => return,
+            Received::Taken | Received::Complete => STATUS_OK,
+            Received::TooMuch => STATUS_TOO_MUCH_DATA,
+        };
+        let acknowledge = Acknowledge { port: self.port, header, count: fragment.count, status };
+        self.acknowledge = Some(acknowledge);
+        // Only what is new proves that the slave gets on: not a repetition, nor a new beginning.
+        let length = response.body().len() as u16;
+        if length > self.collected {
+            self.collected = length;
+            self.silent_at = Deadline::at(now + self.patience.max(FRAGMENT_TIME));
+        }
+        match received {
+            Received::Complete => {
+                self.last = Some(acknowledge);
+                if response.body().first().is_some_and(|service| self.answers(*service)) {
+                    self.end(Ended::Answered);
+                }
+            }
+            Received::TooMuch => self.end(Ended::TooLong),
+            Received::Dropped | Received::Taken => {}
+        }
+    }
+
+    const fn end(&mut self, ended: Ended) {
+        self.stop();
+        self.state = State::Ended(ended);
+    }
+
+    /// The medium reports a frame of ours to the slave, with `data`, as sent.
+    pub(super) fn sent(&mut self, now: Instant, port: Port, data: &[u8]) {
+        let Some(header) = data.first().map(|octet| Header(*octet)) else { return };
         if self.state != State::Asking
-            || header.mac() != self.header.mac()
+            || port != self.port
             || header.transaction() != self.header.transaction()
         {
             return;
         }
-        if !header.fragmented() {
-            self.response.clear();
-            let only = Fragment { kind: Kind::First, count: crate::fragment::FIRST_AND_ONLY };
-            self.response.push(only, rest);
-            return self.answered();
-        }
-        let [octet, octets @ ..] = rest else { return };
-        let fragment = Fragment::from_octet(*octet);
-        self.silent_at = Deadline::at(now + self.patience);
-        if fragment.kind == Kind::Acknowledge {
-            if let [status, ..] = octets {
-                self.sending.acknowledged(fragment.count, *status);
-            }
-            return;
-        }
-        match self.response.push(fragment, octets) {
-            Received::Dropped => {}
-            Received::Taken => self.acknowledge = Some((fragment.count, STATUS_OK)),
-            Received::TooMuch => {
-                self.acknowledge = Some((fragment.count, STATUS_TOO_MUCH_DATA));
-            }
-            Received::Complete => {
-                self.acknowledge = Some((fragment.count, STATUS_OK));
-                self.answered();
-            }
-        }
-    }
-
-    fn answered(&mut self) {
-        let asked = self.request.first().copied().unwrap_or_default();
-        let Some(&service) = self.response.body().first() else { return };
-        if service == Service::ERROR.response() || service == Service(asked).response() {
-            self.state = State::Answered;
-            self.sending.stop();
-            self.silent_at = Deadline::NEVER;
-        }
-    }
-
-    /// How the exchange ended, or `None` while it has not. Call [`stop`](Self::stop) when it has
-    /// been read.
-    pub(super) fn outcome(&self) -> Option<Outcome<'_>> {
-        match self.state {
-            State::Idle | State::Asking => None,
-            State::Silent => Some(Outcome::NoAnswer),
-            State::Answered => Some(match self.response.body() {
-                [0x94, general, additional, ..] => Outcome::Refused(Error {
-                    general: GeneralStatus(*general),
-                    additional: *additional,
-                }),
-                [_, data @ ..] => Outcome::Done(data),
-                [] => Outcome::NoAnswer,
-            }),
+        if header.fragmented() {
+            self.sending.sent(now);
+        } else if self.silent_at != Deadline::NEVER {
+            self.silent_at = Deadline::at(now + self.patience);
         }
     }
 
     pub(super) fn advance(&mut self, now: Instant) {
-        if self.sending.advance(now) || self.silent_at.is_due(now) {
-            self.sending.stop();
-            self.silent_at = Deadline::NEVER;
-            if self.state == State::Asking {
-                self.state = State::Silent;
-            }
+        if self.sending.advance(now) || self.silent_at.is_due(now) || self.ends_at.is_due(now) {
+            self.end(Ended::Silent);
         }
     }
 
     pub(super) fn deadline(&self) -> Deadline {
-        self.sending.deadline().min(self.silent_at)
+        self.sending.deadline().min(self.silent_at).min(self.ends_at)
     }
 
     /// Whether [`transmit`](Self::transmit) has something.
-    pub(super) fn is_owed(&self) -> bool {
+    pub(super) const fn is_owed(&self) -> bool {
         self.acknowledge.is_some() || self.sending.is_owed()
     }
 
-    pub(super) fn transmit(&mut self, now: Instant) -> Option<Frame> {
-        let message = match self.port {
-            Port::Unconnected => UNCONNECTED_REQUEST,
-            Port::Connected => EXPLICIT_REQUEST,
-        };
-        let identifier = group_2(self.slave, message);
-        if let Some((count, status)) = self.acknowledge.take() {
-            let header = self.header.with_fragmented(true).0;
+    pub(super) fn transmit<const REQUEST: usize, const RESPONSE: usize>(
+        &mut self,
+        now: Instant,
+        question: &Question<REQUEST, RESPONSE>,
+    ) -> Option<Frame> {
+        if let Some(Acknowledge { port, header, count, status }) = self.acknowledge.take() {
             let fragment = Fragment { kind: Kind::Acknowledge, count };
-            return Some(Frame::standard(identifier, &[header, fragment.to_octet(), status]));
+            let octets = [header.with_fragmented(true).0, fragment.to_octet(), status];
+            return Some(Frame::standard(self.identifier(port), &octets));
         }
-        let frame = match self.sending.next(now, &self.request)? {
+        let identifier = self.identifier(self.port);
+        let piece = self.sending.next(now, &question.body)?;
+        if self.ends_at == Deadline::NEVER {
+            self.ends_at = Deadline::at(now + self.patience + EXCHANGE_TIME);
+        }
+        Some(match piece {
             Piece::Whole(octets) => {
+                self.silent_at = Deadline::at(now + self.patience + HANDED_TIME);
                 frame(identifier, &[self.header.with_fragmented(false).0], octets)
             }
             Piece::Fragment(fragment, octets) => {
                 let header = self.header.with_fragmented(true).0;
                 frame(identifier, &[header, fragment.to_octet()], octets)
             }
+        })
+    }
+
+    const fn identifier(&self, port: Port) -> u16 {
+        let message = match port {
+            Port::Unconnected => UNCONNECTED_REQUEST,
+            Port::Connected => EXPLICIT_REQUEST,
         };
-        self.silent_at = Deadline::at(now + self.patience);
-        Some(frame)
+        group_2(self.slave, message)
+    }
+}
+
+const fn is_last(fragment: Fragment) -> bool {
+    match fragment.kind {
+        Kind::Last => true,
+        Kind::First => fragment.count == FIRST_AND_ONLY,
+        Kind::Middle | Kind::Acknowledge => false,
     }
 }
 
 /// A frame of a head and what follows it.
-pub(crate) fn frame(identifier: u16, head: &[u8], rest: &[u8]) -> Frame {
+pub(super) fn frame(identifier: u16, head: &[u8], rest: &[u8]) -> Frame {
     let mut octets = [0; 8];
     let length = head.len() + rest.len();
     for (to, from) in octets.iter_mut().zip(head.iter().chain(rest)) {

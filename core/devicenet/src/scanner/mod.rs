@@ -1,156 +1,56 @@
-//! The scanner: a master that allocates its slaves, polls them in cycles, reads and writes their
-//! attributes, notices when one is gone and brings it back.
+//! The scanner: a master that allocates its slaves, exchanges data with them, reads and writes
+//! their attributes, notices when one is gone and brings it back.
+//!
+//! | subject | |
+//! |---|---|
+//! | [`SlaveSettings`] | polled, change of state, cyclic, or explicit messages alone |
+//! | [`Scanner::slave`] | what came in, and where the slave stands |
+//! | [`Scanner::request`] | explicit messages, each with a [`Ticket`] |
+//! | [`Scanner::scan`] | the live list of all 64 addresses |
+//! | [`ParameterWalk`] | what a device never seen before can be told |
 
+mod cycle;
 mod exchange;
+mod io;
+mod live_list;
+mod parameters;
+mod settings;
 mod slave;
+mod station;
+mod steps;
+mod view;
 
-use codewheel_station::can::{self, Filter, Frame};
-use codewheel_station::{Deadline, Duration, Instant, Station};
+use codewheel_station::can::Filter;
+use codewheel_station::{Deadline, Duration, Instant};
 
-use self::exchange::{Outcome, Port, REQUEST_OCTETS};
-use self::slave::Slave;
-use crate::explicit::{Error, Header};
-use crate::identifier::{
-    DUPLICATE_MAC_CHECK, EXPLICIT_RESPONSE, Identifier, POLL_COMMAND, POLL_RESPONSE, group_2,
+use self::cycle::Cycle;
+use self::io::LongPoll;
+use self::live_list::LiveScan;
+use self::slave::{REQUEST_OCTETS, Slave};
+use crate::explicit::{Path, Service};
+use crate::{DuplicateMacCheck, Fault, MacId};
+
+pub use self::exchange::ANSWER_TIME;
+pub use self::io::IO_DATA_OCTETS;
+pub use self::live_list::{LiveList, Presence, Probing, ScanProgress};
+pub use self::parameters::{
+    DataType, Octets, PARAMETER, Parameter, ParameterWalk, Text, Value, Walked,
 };
-use crate::{CheckMessage, DuplicateMacCheck, Fault, MacId};
+pub use self::settings::{
+    ChangeSettings, DeviceIdentity, IdentityCode, NotAdded, NotSet, NotTaken, PollSettings,
+    Refusal, ScannerIdentity, SlaveSettings, Trigger,
+};
+pub use self::view::{CycleTimes, Response, SlaveState, SlaveView, Ticket};
 
-/// What the scanner shall do with one slave.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SlaveSettings {
-    /// Its address.
-    pub mac: MacId,
-    /// The expected packet rate of the poll connection in ms; 0 = no time-out on either side.
-    pub expected_packet_rate: u16,
-    /// The assembly that polls shall bring; `None` leaves what the slave has kept.
-    pub assembly: Option<u8>,
-    /// The vendor and product code the slave must have; `None` takes any.
-    pub identity: Option<(u16, u16)>,
-}
+/// How long [`Scanner::set`] lets a slave take to answer: some write their memory first.
+pub const SET_TIME: Duration = Duration::from_secs(2);
 
-impl SlaveSettings {
-    /// Polls `mac`, whatever it is, with an expected packet rate of 200 ms.
-    #[must_use]
-    pub const fn poll(mac: MacId) -> Self {
-        Self { mac, expected_packet_rate: 200, assembly: None, identity: None }
-    }
-}
-
-/// Who the scanner says it is when it checks its own MAC ID.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ScannerIdentity {
-    /// Vendor code.
-    pub vendor: u16,
-    /// Serial number.
-    pub serial: u32,
-}
-
-/// Why a slave does not exchange data although it answers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    /// It refused a service.
-    Service(Error),
-    /// It is not the device that the settings name.
-    AnotherDevice {
-        /// The code it gave.
-        found: u16,
-        /// The code that was wanted.
-        wanted: u16,
-    },
-}
-
-/// Where a slave stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SlaveState {
-    /// It does not answer.
-    Absent,
-    /// It answers and is being configured.
-    Configuring,
-    /// It answers polls.
-    Running,
-    /// It answers, and refuses; tried again every two seconds.
-    Refused(Refusal),
-}
-
-/// What is known of a slave now.
-#[derive(Clone, Copy, Debug)]
-pub struct SlaveView<'a> {
-    /// Where it stands.
-    pub state: SlaveState,
-    /// Its latest input data; empty before the first poll response.
-    pub input: &'a [u8],
-    /// When the input arrived.
-    pub input_at: Option<Instant>,
-    /// Poll commands sent.
-    pub polls: u64,
-    /// Poll responses received.
-    pub responses: u64,
-    /// How often it was lost while running.
-    pub losses: u32,
-}
-
-/// Names an explicit request until its response has been fetched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Ticket(u32);
-
-/// Why the scanner does not take a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotTaken {
-    /// No slave with this MAC ID has been added.
-    UnknownSlave,
-    /// The slave does not exchange data yet, so there is no explicit connection to it.
-    NotRunning,
-    /// A request to this slave is under way, or its response has not been fetched.
-    Busy,
-    /// The request is longer than 64 octets, or empty.
-    Length,
-}
-
-/// What came back for a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Response<'a> {
-    /// The slave did it; the data of its response.
-    Done(&'a [u8]),
-    /// The slave refused.
-    Refused(Error),
-    /// The slave did not answer in time.
-    NoAnswer,
-}
-
-/// How a slave cannot be added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotAdded {
-    /// All places are taken.
-    Full,
-    /// The address is the scanner's own or has been added before.
-    AddressInUse,
-}
-
-/// The times of the poll cycle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CycleTimes {
-    /// Cycles completed.
-    pub count: u64,
-    /// The last one, from its first poll to its last response.
-    pub last: Duration,
-    /// The longest one.
-    pub longest: Duration,
-}
-
-/// How long the scanner waits for outstanding poll responses before it goes on without them.
-const RESPONSE_TIME: Duration = Duration::from_millis(50);
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Cycle {
-    /// Nothing is polled until then.
-    Pause { until: Instant },
-    /// Polls are being sent; `next` is the place of the next slave to look at.
-    Polling { began: Instant, next: usize },
-    /// All polls are out; responses are waited for.
-    Collecting { began: Instant, until: Instant },
-}
-
-/// A DeviceNet scanner for up to `SLAVES` slaves.
+/// A DeviceNet scanner for up to `SLAVES` slaves, 64 at most.
+///
+/// It checks its own MAC ID first, then brings all slaves of its scan list to data exchange. When
+/// it leaves the bus, all of them are left, and requests under way end with
+/// [`Response::NoAnswer`]. After a bus-off it begins anew when the controller reports itself
+/// recovered; where another node has its MAC ID, it stays silent until [`restart`](Self::restart).
 #[derive(Clone, Debug)]
 pub struct Scanner<const SLAVES: usize = 63> {
     mac: MacId,
@@ -159,15 +59,17 @@ pub struct Scanner<const SLAVES: usize = 63> {
     slaves: [Option<Slave>; SLAVES],
     /// Place of each address among the slaves, plus one.
     places: [u8; 64],
-    /// No slave falls due before this. It may be early, for a deadline that moves on is not noted,
-    /// but is never late. So most frames need not look at every slave.
+    /// When each slave falls due, and the earliest of that. With these, and the bits below, not
+    /// every frame looks at every slave; they may be too early, never too late.
+    due: [Deadline; SLAVES],
     slaves_due: Deadline,
-    /// No exchange has a frame to send unless this is set. In the same way it may be set in vain.
-    owed: bool,
-    cycle: Cycle,
-    interval: Duration,
-    interscan_delay: Duration,
-    times: CycleTimes,
+    /// Who, by place, may have an explicit message to be sent.
+    owing: u64,
+    /// Whose production, by place, is to be acknowledged.
+    acknowledging: u64,
+    cycle: Cycle<SLAVES>,
+    long_poll: LongPoll,
+    live: LiveScan,
     tickets: u32,
 }
 
@@ -176,18 +78,20 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
     /// carries it with an interval of zero.
     #[must_use]
     pub fn new(mac: MacId, identity: ScannerIdentity, interval: Duration) -> Self {
+        const { assert!(SLAVES <= 64, "a segment has 64 addresses") };
         Self {
             mac,
             identity,
             network: DuplicateMacCheck::begin(mac),
             slaves: [const { None }; SLAVES],
             places: [0; 64],
+            due: [Deadline::NEVER; SLAVES],
             slaves_due: Deadline::NEVER,
-            owed: false,
-            cycle: Cycle::Pause { until: Instant::ZERO },
-            interval,
-            interscan_delay: Duration::ZERO,
-            times: CycleTimes::default(),
+            owing: 0,
+            acknowledging: 0,
+            cycle: Cycle::new(interval),
+            long_poll: LongPoll::idle(mac),
+            live: LiveScan::new(mac),
             tickets: 0,
         }
     }
@@ -196,7 +100,7 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
     /// while others are polled as fast as the bus carries it: explicit responses of high MAC IDs
     /// lose arbitration against every poll.
     pub const fn set_interscan_delay(&mut self, delay: Duration) {
-        self.interscan_delay = delay;
+        self.cycle.interscan_delay = delay;
     }
 
     /// The scanner's own address.
@@ -205,24 +109,10 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
         self.mac
     }
 
-    /// Adds a slave to the scan list.
-    ///
-    /// # Errors
-    /// [`NotAdded`] where there is no place, or the address is taken.
-    pub fn add(&mut self, settings: SlaveSettings) -> Result<(), NotAdded> {
-        let address = usize::from(settings.mac.value());
-        let known = self.places.get(address).is_some_and(|place| *place != 0);
-        if settings.mac == self.mac || known {
-            return Err(NotAdded::AddressInUse);
-        }
-        let free = self.slaves.iter_mut().zip(1u8..).find(|(slave, _)| slave.is_none());
-        let (Some((slave, number)), Some(place)) = (free, self.places.get_mut(address)) else {
-            return Err(NotAdded::Full);
-        };
-        let added = slave.insert(Slave::new(settings, self.mac));
-        self.slaves_due = self.slaves_due.min(added.deadline());
-        *place = number;
-        Ok(())
+    /// The frames the scanner wants to see: all, since each says who is there.
+    #[must_use]
+    pub const fn filters(&self) -> [Filter; 1] {
+        [Filter::ALL]
     }
 
     /// Whether the scanner itself is on-line.
@@ -237,37 +127,83 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
         self.network.faulted()
     }
 
+    /// Checks the MAC ID anew and begins again, as after switching on: the way out of
+    /// [`Fault::DuplicateMac`]. Ask [`transmit`](codewheel_station::Station::transmit) afterwards.
+    pub fn restart(&mut self) {
+        self.network = DuplicateMacCheck::begin(self.mac);
+        self.leave_all();
+    }
+
+    /// Adds a slave to the scan list. Read the
+    /// [`deadline`](codewheel_station::Station::deadline) anew afterwards.
+    ///
+    /// # Errors
+    /// [`NotAdded`] where there is no place, or the address is taken; a slave that was
+    /// [removed](Self::remove) keeps it until it is released.
+    pub fn add(&mut self, settings: SlaveSettings) -> Result<(), NotAdded> {
+        let address = usize::from(settings.mac.value());
+        if settings.mac == self.mac || self.place(settings.mac).is_some() {
+            return Err(NotAdded::AddressInUse);
+        }
+        let free = self.slaves.iter().zip(0u8..).find(|(slave, _)| slave.is_none());
+        let Some((_, place)) = free else { return Err(NotAdded::Full) };
+        if let (Some(slave), Some(number)) =
+            (self.slaves.get_mut(usize::from(place)), self.places.get_mut(address))
+        {
+            *slave = Some(Slave::new(settings, self.mac));
+            *number = place + 1;
+        }
+        self.note(usize::from(place));
+        Ok(())
+    }
+
+    /// Takes a slave off the scan list: its connections are released, then it is forgotten and
+    /// [`slave`](Self::slave) gives `None`. Requests to it end with [`Response::NoAnswer`]. Ask
+    /// [`transmit`](codewheel_station::Station::transmit) afterwards. Returns whether there was
+    /// one.
+    pub fn remove(&mut self, mac: MacId) -> bool {
+        let on_line = self.is_on_line();
+        self.change(mac, |slave| slave.remove(on_line)).is_some()
+    }
+
     /// The times of the poll cycle.
     #[must_use]
     pub const fn cycle_times(&self) -> CycleTimes {
-        self.times
+        self.cycle.times
     }
 
     /// What is known of the slave at `mac`; `None` where none was added.
     #[must_use]
     pub fn slave(&self, mac: MacId) -> Option<SlaveView<'_>> {
-        let slave = self.slaves.get(self.place(mac)?)?.as_ref()?;
-        Some(SlaveView {
-            state: slave.state(),
-            input: slave.input(),
-            input_at: slave.input_at,
-            polls: slave.polls,
-            responses: slave.responses,
-            losses: slave.losses,
-        })
+        Some(self.slaves.get(self.place(mac)?)?.as_ref()?.view())
     }
 
-    /// The frames the scanner wants to see: everything of groups 1 and 2.
-    #[must_use]
-    pub const fn filters(&self) -> [Filter; 2] {
-        [Filter { mask: 0x400, value: 0 }, Filter { mask: 0x600, value: 0x400 }]
+    /// Sets what polls carry to the slave at `mac`, in fragments where it does not fit a frame.
+    /// Without data, and by default, polls are empty, which slaves with outputs take as idle.
+    ///
+    /// # Errors
+    /// [`NotSet`] where no such slave is polled, or it consumes another number of octets. What it
+    /// consumes is known once it runs; data set earlier that do not fit make it
+    /// [refused](Refusal::OutputLength).
+    pub fn set_output(&mut self, mac: MacId, data: &[u8]) -> Result<(), NotSet> {
+        let place = self.place(mac).ok_or(NotSet::UnknownSlave)?;
+        let slave = self.slaves.get_mut(place).and_then(Option::as_mut);
+        let slave = slave.filter(|slave| slave.settings.poll.is_some());
+        if slave.ok_or(NotSet::UnknownSlave)?.set_output(data) {
+            Ok(())
+        } else {
+            Err(NotSet::Length)
+        }
     }
 
     /// Sends the explicit request `body` — service, class, instance, attribute, data — to a slave
     /// that exchanges data. It may take up to `patience` to answer; a Save takes up to 5 s.
     ///
-    /// Ask [`transmit`](Station::transmit) afterwards, and [`response`](Self::response) after
-    /// each input, until it comes.
+    /// Without an answer, the explicit connection is allocated anew. Only where the slave had lost
+    /// it, so that it cannot have seen the request, the request is repeated, once.
+    ///
+    /// Ask [`transmit`](codewheel_station::Station::transmit) afterwards, and
+    /// [`response`](Self::response) after each input and each deadline, until it comes.
     ///
     /// # Errors
     /// [`NotTaken`] says why the request cannot be sent now.
@@ -280,39 +216,106 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
         if body.is_empty() || body.len() > REQUEST_OCTETS {
             return Err(NotTaken::Length);
         }
-        let ticket = Ticket(self.tickets);
-        self.change(mac, |slave| {
-            if slave.ticket.is_some() || slave.unanswered.is_some() {
-                return Err(NotTaken::Busy);
-            }
-            if !slave.is_running() {
-                return Err(NotTaken::NotRunning);
-            }
-            slave.ticket = Some(ticket);
-            slave.exchange.begin(Port::Connected, body, patience);
-            Ok(())
-        })
-        .unwrap_or(Err(NotTaken::UnknownSlave))?;
+        if self.place(mac).is_none() {
+            return Err(NotTaken::UnknownSlave);
+        }
+        if !self.is_on_line() {
+            return Err(NotTaken::OffLine);
+        }
+        let ticket = Ticket { mac, number: self.tickets };
+        self.change(mac, |slave| slave.request(ticket, body, patience))
+            .unwrap_or(Err(NotTaken::UnknownSlave))?;
         self.tickets = self.tickets.wrapping_add(1);
         Ok(ticket)
     }
 
-    /// What came back for `ticket`; `None` while nothing has, or for a ticket that was fetched.
-    /// `with` sees the response; afterwards the slave can be asked again.
+    /// Reads an attribute: [`request`](Self::request) of Get_Attribute_Single with a patience of
+    /// [`ANSWER_TIME`].
+    ///
+    /// # Errors
+    /// [`NotTaken`] says why the request cannot be sent now.
+    pub fn get(&mut self, mac: MacId, path: Path) -> Result<Ticket, NotTaken> {
+        let Path { class, instance, attribute } = path;
+        let body = [Service::GET_ATTRIBUTE_SINGLE.0, class, instance, attribute];
+        self.request(mac, &body, ANSWER_TIME)
+    }
+
+    /// Writes an attribute: [`request`](Self::request) of Set_Attribute_Single with a patience of
+    /// [`SET_TIME`]. `data` has 60 octets at most.
+    ///
+    /// # Errors
+    /// [`NotTaken`] says why the request cannot be sent now.
+    pub fn set(&mut self, mac: MacId, path: Path, data: &[u8]) -> Result<Ticket, NotTaken> {
+        let Path { class, instance, attribute } = path;
+        let head = [Service::SET_ATTRIBUTE_SINGLE.0, class, instance, attribute];
+        let mut body = [0; REQUEST_OCTETS];
+        for (to, from) in body.iter_mut().zip(head.iter().chain(data)) {
+            *to = *from;
+        }
+        let body = body.get(..head.len() + data.len()).ok_or(NotTaken::Length)?;
+        self.request(mac, body, SET_TIME)
+    }
+
+    /// What came back for `ticket`; `None` while nothing has. `with` sees the response; afterwards
+    /// the slave can be asked again, and the ticket says [`Response::NoAnswer`], as one of a slave
+    /// that was removed does.
     pub fn response<T>(
         &mut self,
         ticket: Ticket,
         with: impl FnOnce(Response<'_>) -> T,
     ) -> Option<T> {
-        let slave = self.slaves.iter_mut().flatten().find(|slave| slave.ticket == Some(ticket))?;
-        let seen = with(match slave.exchange.outcome()? {
-            Outcome::Done(data) => Response::Done(data),
-            Outcome::Refused(error) => Response::Refused(error),
-            Outcome::NoAnswer => Response::NoAnswer,
-        });
-        slave.ticket = None;
-        slave.exchange.stop();
+        let place = self.place(ticket.mac);
+        let slave = place.and_then(|place| self.slaves.get_mut(place)?.as_mut());
+        let Some(slave) = slave.filter(|slave| slave.holds(ticket)) else {
+            return Some(with(Response::NoAnswer));
+        };
+        let seen = with(slave.outcome()?);
+        slave.cancel();
         Some(seen)
+    }
+
+    /// Gives a request up: its response, if it still comes, is dropped, and the slave can be asked
+    /// again. Whether the slave has done what it was asked for stays unknown. Returns whether the
+    /// ticket was still good.
+    pub fn cancel(&mut self, ticket: Ticket) -> bool {
+        self.change(ticket.mac, |slave| {
+            let held = slave.holds(ticket);
+            if held {
+                slave.cancel();
+            }
+            held
+        })
+        .unwrap_or(false)
+    }
+
+    /// Begins to look who is on the segment: the scanner listens for 1.1 s, then asks each address
+    /// that has not answered; see [`Probing`]. After about four seconds, and ten at the most,
+    /// [`live_list`](Self::live_list) is complete. Slaves of the scan list are not probed, they
+    /// are known. Polls and requests go on.
+    ///
+    /// # Errors
+    /// [`NotTaken::OffLine`].
+    pub fn scan(&mut self, now: Instant, probing: Probing) -> Result<(), NotTaken> {
+        if !self.is_on_line() {
+            return Err(NotTaken::OffLine);
+        }
+        self.live.begin(now, probing);
+        Ok(())
+    }
+
+    /// Who is on the segment, as far as is known. Without a [`scan`](Self::scan), or before it is
+    /// complete, that is what was heard so far.
+    #[must_use]
+    pub fn live_list(&self) -> LiveList {
+        let mut list = self.live.list();
+        for slave in self.slaves.iter().flatten() {
+            let address = usize::from(slave.settings.mac.value());
+            let answers = slave.view().state != SlaveState::Absent;
+            if let Some(node) = list.nodes.get_mut(address).filter(|_| answers) {
+                *node = Presence::Answers;
+            }
+        }
+        list
     }
 
     fn place(&self, mac: MacId) -> Option<usize> {
@@ -320,149 +323,49 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
         usize::from(place).checked_sub(1)
     }
 
-    /// Changes the slave at `mac`, and notes what it has to send and when it falls due then; `None`
-    /// where none was added.
+    /// Changes the slave at `mac`, and notes what has come of it; `None` where none was added.
     fn change<T>(&mut self, mac: MacId, change: impl FnOnce(&mut Slave) -> T) -> Option<T> {
         let place = self.place(mac)?;
-        let slave = self.slaves.get_mut(place)?.as_mut()?;
-        let result = change(slave);
-        self.slaves_due = self.slaves_due.min(slave.deadline());
-        self.owed |= slave.exchange.is_owed();
+        let result = change(self.slaves.get_mut(place)?.as_mut()?);
+        self.note(place);
         Some(result)
     }
 
-    fn frame(&mut self, now: Instant, frame: &Frame) {
-        let can::Identifier::Standard(bits) = frame.identifier() else { return };
-        if frame.is_remote() {
-            return;
-        }
-        match Identifier::from_bits(bits) {
-            Identifier::Group2 { mac, message: DUPLICATE_MAC_CHECK } => {
-                if mac == self.mac {
-                    self.network.heard(frame.data());
-                } else if CheckMessage::parse(frame.data()).is_ok_and(|check| !check.response) {
-                    self.change(mac, |slave| slave.booted(now));
-                }
-            }
-            _ if !self.network.is_on_line() => {}
-            Identifier::Group1 { message: POLL_RESPONSE, source } => {
-                self.change(source, |slave| slave.response(now, frame.data()));
-                self.close_cycle(now);
-            }
-            Identifier::Group2 { mac, message: EXPLICIT_RESPONSE } => {
-                if let [first, rest @ ..] = frame.data() {
-                    self.change(mac, |slave| {
-                        slave.exchange.heard(now, Header(*first), rest);
-                        slave.advance(now);
-                    });
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// Ends the cycle when every polled slave has answered or the time for it is over.
-    fn close_cycle(&mut self, now: Instant) {
-        let Cycle::Collecting { began, until } = self.cycle else { return };
-        let outstanding = self.slaves.iter().flatten().any(|slave| slave.awaited);
-        if outstanding && now < until {
-            return;
-        }
-        self.times.count += 1;
-        self.times.last = now.since(began);
-        self.times.longest = self.times.longest.max(self.times.last);
-        let until = (began + self.interval).max(now + self.interscan_delay);
-        self.cycle = Cycle::Pause { until };
-    }
-
-    fn next_poll(&mut self, now: Instant) -> Option<Frame> {
-        if let Cycle::Pause { until } = self.cycle
-            && now >= until
-            && self.slaves.iter().flatten().any(Slave::is_running)
+    /// Notes what the slave at `place` has to send, and when it falls due; frees the place of one
+    /// that is gone.
+    fn note(&mut self, place: usize) {
+        let Some(slot) = self.slaves.get_mut(place) else { return };
+        if let Some(slave) = slot.take_if(|slave| slave.is_gone())
+            && let Some(number) = self.places.get_mut(usize::from(slave.settings.mac.value()))
         {
-            self.cycle = Cycle::Polling { began: now, next: 0 };
+            *number = 0;
         }
-        let Cycle::Polling { began, next } = self.cycle else { return None };
-        for (place, slave) in self.slaves.iter_mut().enumerate().skip(next) {
-            let Some(slave) = slave.as_mut().filter(|slave| slave.is_running()) else { continue };
-            slave.awaited = true;
-            slave.polls += 1;
-            self.cycle = Cycle::Polling { began, next: place + 1 };
-            return Some(Frame::standard(group_2(slave.settings.mac, POLL_COMMAND), &[]));
+        let slave = slot.as_ref();
+        set(&mut self.owing, place, slave.is_some_and(Slave::is_owed));
+        set(&mut self.acknowledging, place, slave.is_some_and(|slave| slave.acknowledge));
+        self.cycle.set_polled(place, slave.is_some_and(Slave::is_polled));
+        let due = slave.map_or(Deadline::NEVER, Slave::deadline);
+        if let Some(noted) = self.due.get_mut(place) {
+            *noted = due;
         }
-        self.cycle = Cycle::Collecting { began, until: now + RESPONSE_TIME };
-        self.close_cycle(now);
-        None
+        self.slaves_due = self.slaves_due.min(due);
+    }
+
+    /// The scanner has left the bus: so have, for it, all slaves.
+    fn leave_all(&mut self) {
+        self.live.abort();
+        self.long_poll.stop();
+        for place in 0..SLAVES {
+            if let Some(slave) = self.slaves.get_mut(place).and_then(Option::as_mut) {
+                slave.fall_silent();
+                self.note(place);
+            }
+        }
+        self.cycle.reset();
     }
 }
 
-impl<const SLAVES: usize> Station for Scanner<SLAVES> {
-    type Input<'a> = can::Input<'a>;
-    type Output = Frame;
-
-    fn handle(&mut self, now: Instant, input: can::Input<'_>) {
-        self.advance(now);
-        match input {
-            can::Input::Frame(frame) => self.frame(now, frame),
-            can::Input::Sent(frame) => {
-                if let can::Identifier::Standard(bits) = frame.identifier() {
-                    self.network.sent(now, bits);
-                }
-            }
-            can::Input::BusOff => self.network.fault(Fault::BusOff),
-            can::Input::Recovered => {}
-        }
-    }
-
-    fn advance(&mut self, now: Instant) {
-        if self.deadline().is_none_or(|deadline| now < deadline) {
-            return;
-        }
-        self.network.advance(now);
-        if !self.network.is_on_line() {
-            return;
-        }
-        if self.slaves_due.take_due(now) {
-            for slave in self.slaves.iter_mut().flatten() {
-                slave.advance(now);
-                self.slaves_due = self.slaves_due.min(slave.deadline());
-            }
-            self.owed = true;
-        }
-        self.close_cycle(now);
-    }
-
-    fn transmit(&mut self, now: Instant) -> Option<Frame> {
-        if !self.network.is_on_line() {
-            return self.network.transmit(self.identity.vendor, self.identity.serial);
-        }
-        if let Some(frame) = self.network.transmit(self.identity.vendor, self.identity.serial) {
-            return Some(frame);
-        }
-        if self.owed {
-            for slave in self.slaves.iter_mut().flatten() {
-                if let Some(frame) = slave.exchange.transmit(now) {
-                    self.slaves_due = self.slaves_due.min(slave.deadline());
-                    return Some(frame);
-                }
-            }
-            self.owed = false;
-        }
-        self.next_poll(now)
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        if !self.network.is_on_line() {
-            return self.network.deadline().instant();
-        }
-        let cycle = match self.cycle {
-            Cycle::Pause { until } => {
-                let running = self.slaves.iter().flatten().any(Slave::is_running);
-                Deadline::from(running.then_some(until))
-            }
-            Cycle::Polling { .. } => Deadline::NEVER,
-            Cycle::Collecting { until, .. } => Deadline::at(until),
-        };
-        cycle.min(self.slaves_due).instant()
-    }
+/// Sets or clears the bit of a place.
+const fn set(bits: &mut u64, place: usize, on: bool) {
+    *bits = *bits & !(1 << place) | (on as u64) << place;
 }

@@ -137,6 +137,11 @@ impl Messages {
         self.pending.is_some()
     }
 
+    /// Whether a response, or a piece of it, has not been handed out yet.
+    pub(super) const fn is_owed(&self) -> bool {
+        self.sending.is_owed() || self.pending.is_some()
+    }
+
     /// The service that `header` asked for will be answered later.
     pub(super) const fn defer(&mut self, header: Header, service: Service) {
         self.pending = Some(Pending { header, service, result: None });

@@ -230,8 +230,9 @@ impl Server {
             }
         } else if bits == group_2(self.mac, EXPLICIT_RESPONSE) {
             self.messages.sent(now, frame);
-            let answer =
-                matches!(*frame.data(), [_, service] if service == Service::RESET.response());
+            // The reset of a connection is answered alike; while ours is still owed, it is not this.
+            let answer = !self.messages.is_owed()
+                && matches!(*frame.data(), [_, service] if service == Service::RESET.response());
             if self.restart == Restart::Answering && answer {
                 self.restart = Restart::Due;
             }

@@ -145,8 +145,9 @@ impl Production {
             self.due_at = Deadline::NEVER;
             return;
         };
-        let next = due + rate;
-        self.due_at = Deadline::at(if next > now { next } else { now + rate });
+        // However many beats were missed, the next one comes when it would have come.
+        let beats = now.since(due).as_nanos() / rate.as_nanos().max(1) + 1;
+        self.due_at = Deadline::at(due + rate.times(beats));
     }
 
     /// The production owed has been built and handed out.
@@ -174,6 +175,10 @@ impl Production {
     /// The master's acknowledge arrived.
     pub(super) fn acknowledge(&mut self, now: Instant) {
         self.io.connection.arm(now);
+        if self.waiting {
+            // What may be owed is a repeat that has not reached the wire; nobody needs it now.
+            self.io.owed = false;
+        }
         self.waiting = false;
         self.repeats = 0;
         self.acknowledge_by = Deadline::NEVER;

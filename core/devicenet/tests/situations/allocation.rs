@@ -152,3 +152,28 @@ fn a_timed_out_poll_connection_may_be_allocated_anew() {
     bench.says("42E#0A4B0301020A", &["42B#0ACB00"]);
     assert_eq!(bench.node.server.connection_state(2), Some(State::Configuring));
 }
+
+#[test]
+fn an_allocator_above_63_is_looked_at_after_the_owner() {
+    let mut owned = Bench::allocated();
+    owned.says("42E#0B4B03010340", &["42B#0B940C01"]);
+    owned.says("42E#0A4B030103FF", &["42B#0A940C01"]);
+    assert_eq!(owned.node.server.master(), MacId::new(10));
+}
+
+#[test]
+fn a_refusal_to_another_master_does_not_overwrite_the_success_owed_to_the_first() {
+    let mut bench = Bench::on_line();
+    bench.hears("42E#0A4B0301030A");
+    bench.hears("42E#0B4B0301030B");
+    bench.hears("42E#0C0E010101");
+    assert_eq!(bench.collect(), ["42B#0ACB00"]);
+    // The release is good news as well.
+    bench.hears("42E#0A4C030103");
+    bench.hears("42E#0B4C030103");
+    assert_eq!(bench.collect(), ["42B#0ACC"]);
+    // A refusal that waits makes room for a success.
+    bench.hears("42E#0B4B0301000B");
+    bench.hears("42E#0A4B0301030A");
+    assert_eq!(bench.collect(), ["42B#0ACB00"]);
+}

@@ -19,6 +19,8 @@ pub(crate) struct Toy {
     pub(crate) reset: Option<Reset>,
     /// Whether the data have changed since they were produced.
     pub(crate) moved: bool,
+    /// Whether the next look at the data, for whatever production, finds them changed.
+    pub(crate) moves_when_produced: bool,
 }
 
 pub(crate) const TEXT: &[u8; 40] = b"a text that does not fit a single frame.";
@@ -43,6 +45,7 @@ impl Application for Toy {
     }
     fn produce(&mut self, _: Instant, instance: u8, octets: &mut [u8; 8]) -> usize {
         self.produced += 1;
+        self.moved |= std::mem::take(&mut self.moves_when_produced);
         octets[..4].copy_from_slice(&self.produced.to_le_bytes());
         usize::from(instance) + 3
     }
@@ -180,6 +183,29 @@ impl Bench {
         bench
     }
 
+    /// On-line, `choice` allocated by master 10, and the explicit connection without a time-out.
+    pub(crate) fn with(choice: u8) -> Self {
+        let mut bench = Self::on_line();
+        bench.says(&format!("42E#0A4B0301{choice:02X}0A"), &["42B#0ACB00"]);
+        bench.asks("10 05 01 09 00 00", "90 0000");
+        bench
+    }
+
+    /// A frame arrives; what the node has to say waits for the wire.
+    pub(crate) fn hears(&mut self, candump: &str) {
+        self.node.handle(self.now, can::Input::Frame(&frame(candump)));
+    }
+
+    /// One frame goes from the node to its controller, which does not report it as sent.
+    pub(crate) fn hands_out(&mut self) -> Option<Frame> {
+        self.node.transmit(self.now)
+    }
+
+    /// The controller reports `frame` as sent.
+    pub(crate) fn is_sent(&mut self, frame: &Frame) {
+        self.node.handle(self.now, can::Input::Sent(frame));
+    }
+
     /// Takes everything the node has to send now.
     pub(crate) fn collect(&mut self) -> Vec<String> {
         let mut sent = Vec::new();
@@ -275,13 +301,18 @@ impl Bench {
 
     /// Lets time pass from deadline to deadline and returns what the node sent meanwhile.
     pub(crate) fn wait(&mut self, span: Duration) -> Vec<String> {
+        self.log(span).into_iter().map(|(_, frame)| frame).collect()
+    }
+
+    /// The same, with the time of each frame.
+    pub(crate) fn log(&mut self, span: Duration) -> Vec<(Instant, String)> {
         let end = self.now + span;
         let mut sent = Vec::new();
         while let Some(deadline) = self.node.deadline().filter(|deadline| *deadline <= end) {
             assert!(deadline >= self.now, "a deadline lies in the past");
             self.now = deadline;
             self.node.advance(self.now);
-            sent.append(&mut self.collect());
+            sent.extend(self.collect().into_iter().map(|frame| (self.now, frame)));
             assert!(
                 self.node.deadline() != Some(deadline),
                 "the deadline {deadline} is not served"
@@ -289,7 +320,7 @@ impl Bench {
         }
         self.now = end;
         self.node.advance(self.now);
-        sent.append(&mut self.collect());
+        sent.extend(self.collect().into_iter().map(|frame| (self.now, frame)));
         sent
     }
 }

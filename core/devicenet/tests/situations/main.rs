@@ -1,13 +1,31 @@
 //! The server and the scanner as a peer meets them: conversations in candump's notation.
 
+mod acknowledge_handler;
+mod acknowledged;
 mod allocation;
 mod anything_at_all;
 mod bench;
+mod bus_off;
+mod change_of_state;
 mod connections;
+mod cyclic;
 mod explicit_messages;
 mod fragmented_messages;
 mod getting_on_line;
+mod heartbeat;
 mod objects;
+mod overlapping;
 mod polling;
+mod restarts;
+mod scanner_allocation;
+mod scanner_anything_at_all;
+mod scanner_bench;
+mod scanner_changes;
+mod scanner_cycle;
+mod scanner_io;
+mod scanner_live_list;
 mod scanner_meets_servers;
+mod scanner_off_line;
+mod scanner_parameters;
+mod scanner_requests;
 mod slow_services;

@@ -2,7 +2,8 @@
 
 use codewheel_devicenet::connection::State;
 use codewheel_devicenet::scanner::{
-    NotTaken, Refusal, Response, Scanner, ScannerIdentity, SlaveSettings, SlaveState,
+    ChangeSettings, DeviceIdentity, IdentityCode, NotTaken, PollSettings, Refusal, Response,
+    Scanner, ScannerIdentity, SlaveSettings, SlaveState,
 };
 use codewheel_devicenet::{MacId, NetworkStatus};
 use codewheel_station::can::{Frame, Input};
@@ -25,13 +26,20 @@ const FRAME_TIME: Duration = Duration::from_micros(200);
 
 impl Segment {
     fn new(macs: &[u8]) -> Self {
+        let settings: Vec<_> =
+            macs.iter().map(|mac| SlaveSettings::poll(MacId::new(*mac).unwrap())).collect();
+        Self::with(&settings)
+    }
+
+    fn with(settings: &[SlaveSettings]) -> Self {
         let identity = ScannerIdentity { vendor: 1, serial: 99 };
         let master = MacId::new(0).unwrap();
         let mut scanner = Scanner::new(master, identity, Duration::from_millis(10));
-        for mac in macs {
-            scanner.add(SlaveSettings::poll(MacId::new(*mac).unwrap())).unwrap();
+        for settings in settings {
+            scanner.add(*settings).unwrap();
         }
-        let nodes: Vec<Node> = macs.iter().map(|mac| Node::new(*mac)).collect();
+        let nodes: Vec<Node> =
+            settings.iter().map(|settings| Node::new(settings.mac.value())).collect();
         let on = vec![true; nodes.len()];
         Self { scanner, nodes, on, now: Instant::ZERO, lost: |_, _| false, frames: 0 }
     }
@@ -90,6 +98,10 @@ impl Segment {
         self.scanner.slave(MacId::new(mac).unwrap()).unwrap().responses
     }
 
+    fn changes(&self, mac: u8) -> u64 {
+        self.scanner.slave(MacId::new(mac).unwrap()).unwrap().changes
+    }
+
     fn ask(&mut self, mac: u8, body: &[u8]) -> Result<Vec<u8>, String> {
         let mac = MacId::new(mac).unwrap();
         let patience = Duration::from_millis(500);
@@ -99,7 +111,7 @@ impl Segment {
             let seen = self.scanner.response(ticket, |response| match response {
                 Response::Done(data) => Ok(data.to_vec()),
                 Response::Refused(error) => Err(error.to_string()),
-                Response::NoAnswer => Err("no answer".into()),
+                Response::TooLong | Response::NoAnswer => Err("no answer".into()),
             });
             if let Some(seen) = seen {
                 return seen;
@@ -199,10 +211,14 @@ fn a_device_that_is_not_the_wanted_one_is_not_polled() {
     segment.nodes.push(Node::new(5));
     segment.on.push(true);
     let mac = MacId::new(5).unwrap();
-    let settings = SlaveSettings { identity: Some((0x1234, 0x0A)), ..SlaveSettings::poll(mac) };
+    let settings = SlaveSettings {
+        identity: Some(DeviceIdentity { vendor: 0x1234, product_code: 0x0A }),
+        ..SlaveSettings::poll(mac)
+    };
     segment.scanner.add(settings).unwrap();
     segment.run(Duration::from_secs(4));
-    let refusal = Refusal::AnotherDevice { found: 0x0B, wanted: 0x0A };
+    let refusal =
+        Refusal::AnotherDevice { code: IdentityCode::ProductCode, found: 0x0B, wanted: 0x0A };
     assert_eq!(segment.state(5), SlaveState::Refused(refusal));
     assert_eq!(segment.responses(5), 0);
 }
@@ -213,7 +229,8 @@ fn a_slave_produces_the_assembly_that_the_settings_name() {
     segment.nodes.push(Node::new(5));
     segment.on.push(true);
     let mac = MacId::new(5).unwrap();
-    let settings = SlaveSettings { assembly: Some(2), ..SlaveSettings::poll(mac) };
+    let poll = Some(PollSettings { expected_packet_rate: 200, assembly: Some(2) });
+    let settings = SlaveSettings { poll, ..SlaveSettings::poll(mac) };
     segment.scanner.add(settings).unwrap();
     segment.run(Duration::from_secs(4));
     assert_eq!(segment.scanner.slave(mac).unwrap().input.len(), 5);
@@ -225,7 +242,7 @@ fn a_request_to_a_slave_that_is_not_there_is_not_taken() {
     let patience = Duration::from_millis(500);
     let mac = |value| MacId::new(value).unwrap();
     let mut ask = |mac, body: &[u8]| segment.scanner.request(mac, body, patience);
-    assert_eq!(ask(mac(5), &[0x0E, 1, 1, 1]), Err(NotTaken::NotRunning));
+    assert_eq!(ask(mac(5), &[0x0E, 1, 1, 1]), Err(NotTaken::OffLine));
     assert_eq!(ask(mac(6), &[0x0E, 1, 1, 1]), Err(NotTaken::UnknownSlave));
     assert_eq!(ask(mac(5), &[]), Err(NotTaken::Length));
     assert_eq!(ask(mac(5), &[0; 65]), Err(NotTaken::Length));
@@ -258,4 +275,153 @@ fn every_tenth_frame_lost_at_random_slows_the_start_and_prevents_nothing() {
         segment.run(Duration::from_secs(10));
         assert!(segment.responses(mac) - before > 100, "slave {mac} hardly answers");
     }
+}
+
+/// Settings for MAC ID 5 with change of state data every `rate` ms and when they change.
+fn change_of_state(rate: u16, acknowledged: bool) -> SlaveSettings {
+    let settings = SlaveSettings::change_of_state(MacId::new(5).unwrap());
+    let change = settings.change.map(|change| ChangeSettings {
+        expected_packet_rate: rate,
+        acknowledged,
+        ..change
+    });
+    SlaveSettings { change, ..settings }
+}
+
+#[test]
+fn change_of_state_data_come_when_they_change_and_when_the_rate_elapses() {
+    for acknowledged in [true, false] {
+        let mut segment = Segment::with(&[change_of_state(200, acknowledged)]);
+        segment.run(Duration::from_secs(3));
+        assert_eq!(segment.state(5), SlaveState::Running);
+        let before = segment.changes(5);
+        segment.run(Duration::from_secs(20));
+        let by_time = segment.changes(5) - before;
+        assert!((99..=101).contains(&by_time), "{by_time} in 20 s, acknowledged: {acknowledged}");
+        let before = segment.changes(5);
+        for _ in 0..10 {
+            segment.nodes[0].toy.moved = true;
+            // The server looks for changes whenever it is run; it is asked for frames after that.
+            segment.run(Duration::from_millis(10));
+            segment.run(Duration::from_millis(10));
+        }
+        let by_change = segment.changes(5) - before;
+        assert!(by_change >= 10, "{by_change} of ten changes");
+        assert_eq!(segment.scanner.slave(MacId::new(5).unwrap()).unwrap().losses, 0);
+        assert_eq!(segment.nodes[0].server.connection_state(4), Some(State::Established));
+    }
+}
+
+#[test]
+fn cyclic_data_keep_their_beat() {
+    let mut segment = Segment::with(&[SlaveSettings::cyclic(MacId::new(5).unwrap(), 50)]);
+    segment.run(Duration::from_secs(3));
+    let before = segment.changes(5);
+    segment.run(Duration::from_secs(30));
+    let beats = segment.changes(5) - before;
+    assert!((599..=601).contains(&beats), "{beats} in 30 s of 50 ms each");
+    assert_eq!(segment.responses(5), 0);
+}
+
+#[test]
+fn a_slave_is_polled_and_produces_changes_side_by_side() {
+    let poll = SlaveSettings::poll(MacId::new(5).unwrap()).poll;
+    let mut segment = Segment::with(&[SlaveSettings { poll, ..change_of_state(500, true) }]);
+    segment.run(Duration::from_secs(3));
+    let (responses, changes) = (segment.responses(5), segment.changes(5));
+    segment.run(Duration::from_secs(10));
+    assert!((990..=1_010).contains(&(segment.responses(5) - responses)));
+    assert!((19..=21).contains(&(segment.changes(5) - changes)));
+    assert_eq!(segment.ask(5, &[0x0E, 0x64, 1, 2]), Ok(TEXT.to_vec()));
+}
+
+#[test]
+fn a_change_of_state_slave_that_loses_power_is_missed_and_comes_back() {
+    let mut segment = Segment::with(&[change_of_state(100, true)]);
+    segment.run(Duration::from_secs(3));
+    segment.on[0] = false;
+    segment.run(Duration::from_secs(2));
+    assert_eq!(segment.state(5), SlaveState::Absent);
+    segment.nodes[0] = Node::new(5);
+    segment.on[0] = true;
+    segment.run(Duration::from_secs(4));
+    assert_eq!(segment.state(5), SlaveState::Running);
+    let before = segment.changes(5);
+    segment.run(Duration::from_secs(1));
+    assert!(segment.changes(5) - before >= 9);
+}
+
+#[test]
+fn an_explicit_connection_alone_lives_for_an_hour_and_answers() {
+    let mut segment = Segment::with(&[SlaveSettings::explicit(MacId::new(5).unwrap())]);
+    segment.run(Duration::from_secs(3_600));
+    let slave = segment.scanner.slave(MacId::new(5).unwrap()).unwrap();
+    assert_eq!((slave.state, slave.losses), (SlaveState::Running, 0));
+    assert_eq!(segment.nodes[0].server.connection_state(1), Some(State::Established));
+    assert_eq!(segment.nodes[0].server.connection_state(2), None);
+    assert_eq!(segment.ask(5, &[0x0E, 0x64, 1, 2]), Ok(TEXT.to_vec()));
+}
+
+#[test]
+fn a_slave_taken_off_the_list_belongs_to_nobody() {
+    let poll = SlaveSettings::poll(MacId::new(5).unwrap()).poll;
+    let mut segment = Segment::with(&[SlaveSettings { poll, ..change_of_state(500, true) }]);
+    segment.run(Duration::from_secs(3));
+    segment.scanner.remove(MacId::new(5).unwrap());
+    segment.run(Duration::from_millis(100));
+    assert_eq!(segment.nodes[0].server.master(), None);
+    assert_eq!(segment.nodes[0].server.status(), NetworkStatus::OnLine);
+    assert!(segment.scanner.slave(MacId::new(5).unwrap()).is_none());
+}
+
+#[test]
+fn a_scanner_that_restarts_gets_every_kind_of_connection_back() {
+    let poll = SlaveSettings::poll(MacId::new(5).unwrap()).poll;
+    for settings in [
+        SlaveSettings { poll, ..change_of_state(5_000, true) },
+        SlaveSettings::cyclic(MacId::new(5).unwrap(), 5_000),
+        SlaveSettings::explicit(MacId::new(5).unwrap()),
+    ] {
+        let mut segment = Segment::with(&[settings]);
+        segment.run(Duration::from_secs(3));
+        let identity = ScannerIdentity { vendor: 1, serial: 99 };
+        segment.scanner = Scanner::new(MacId::new(0).unwrap(), identity, Duration::from_millis(10));
+        // This life wants something else than the last.
+        segment.scanner.add(SlaveSettings::poll(MacId::new(5).unwrap())).unwrap();
+        segment.run(Duration::from_secs(3));
+        assert_eq!(segment.state(5), SlaveState::Running, "after {settings:?}");
+        assert_eq!(segment.nodes[0].server.connection_state(4), None, "after {settings:?}");
+    }
+}
+
+#[test]
+fn the_wrong_device_is_free_for_other_masters() {
+    let mac = MacId::new(5).unwrap();
+    let identity = Some(DeviceIdentity { vendor: 0x1234, product_code: 0x0A });
+    let mut segment = Segment::with(&[SlaveSettings { identity, ..SlaveSettings::poll(mac) }]);
+    segment.run(Duration::from_millis(3_500));
+    assert!(matches!(segment.state(5), SlaveState::Refused(Refusal::AnotherDevice { .. })));
+    assert_eq!(segment.nodes[0].server.master(), None);
+}
+
+#[test]
+fn requests_to_slaves_that_lose_every_tenth_frame_end_with_the_right_answer_or_none() {
+    let mut segment = Segment::new(&[3, 5]);
+    segment.run(Duration::from_secs(3));
+    segment.lost = |count, _| {
+        let scattered = count.wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
+        scattered.wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 32 & 0xFF < 26
+    };
+    let mut good = 0;
+    for _ in 0..60 {
+        match segment.ask(5, &[0x0E, 0x64, 1, 2]) {
+            Ok(data) => {
+                assert_eq!(data, TEXT);
+                good += 1;
+            }
+            Err(why) => assert!(why == "no answer" || why == "NotRunning", "{why}"),
+        }
+        segment.run(Duration::from_millis(50));
+    }
+    assert!(good > 30, "{good} of 60 answered");
 }
