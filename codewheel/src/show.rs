@@ -47,22 +47,35 @@ fn fresh<'a>(
 }
 
 /// Where a device stands with its master, or, where nobody here masters it, what it says itself.
-const fn connection(device: &DeviceSnapshot) -> &'static str {
+fn connection(device: &DeviceSnapshot) -> &'static str {
     if let Some(master) = &device.master {
         return match master.state {
             SlaveState::Absent => "absent",
             SlaveState::Configuring => "configuring",
-            SlaveState::Running => "polled",
+            SlaveState::Running => match device.device.as_ref().map(established) {
+                Some(kind) => kind,
+                None => "running",
+            },
             SlaveState::Refused(_) => "refused",
         };
     }
     let Some(device) = &device.device else { return "absent" };
-    match (device.poll, device.explicit) {
-        (Some(State::Established), _) => "polled",
+    match (device.poll.or(device.change_of_state), device.explicit) {
+        (Some(State::Established), _) => established(device),
         (Some(State::TimedOut), _) => "timed-out",
         (Some(_), _) => "configuring",
         (None, Some(_)) => "explicit",
         (None, None) => "none",
+    }
+}
+
+/// Which I/O connection a device exchanges data on.
+const fn established(device: &codewheel_device::Snapshot) -> &'static str {
+    match (device.poll, device.change_of_state) {
+        (Some(State::Established), Some(State::Established)) => "polled+cos",
+        (Some(State::Established), _) => "polled",
+        (_, Some(State::Established)) => "cos",
+        _ => "explicit",
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use codewheel_device::{Product, Switches, product};
 use codewheel_devicenet::MacId;
+use codewheel_devicenet::scanner::Trigger;
 use codewheel_link::BusUri;
 use codewheel_sim::can::Faults;
 use codewheel_sim::shaft::Shaft;
@@ -15,10 +16,11 @@ use toml::Spanned;
 
 use crate::complaint::line_of;
 use crate::file::{
-    BusTable, DeviceTable, MasterTable, PlantFile, SlaveTable, SwitchTable, SwitchesValue,
+    BusTable, Connection, DeviceTable, MasterTable, PlantFile, SlaveTable, SwitchTable,
+    SwitchesValue,
 };
 use crate::plant::default_name;
-use crate::{BusPlan, Complaint, DevicePlan, MasterPlan, Plant, SlavePlan};
+use crate::{BusPlan, Complaint, DevicePlan, Exchange, MasterPlan, Plant, SlavePlan, TimeSpan};
 
 mod faults;
 
@@ -361,20 +363,65 @@ impl Source<'_> {
         })
     }
 
+    /// A timer of a connection: two octets of milliseconds.
+    fn rate(&self, value: &Spanned<TimeSpan>, name: &str) -> Result<u16, Complaint> {
+        let time = value.get_ref().0;
+        let millis = u16::try_from(time.as_millis()).ok();
+        millis.filter(|_| time == Duration::from_millis(time.as_millis())).ok_or_else(|| {
+            let given = value.get_ref();
+            let message =
+                format!("{given} is no {name}: it is 0 to 65535ms, in whole milliseconds");
+            self.complaint(value.span(), message)
+        })
+    }
+
+    fn exchange(&self, table: &SlaveTable, rate: u16) -> Result<Exchange, Complaint> {
+        let trigger = match table.connection {
+            Connection::ChangeOfState => Trigger::ChangeOfState,
+            Connection::Cyclic => Trigger::Cyclic,
+            Connection::Poll | Connection::Explicit => {
+                let spans = [
+                    table.acknowledged.as_ref().map(Spanned::span),
+                    table.production_inhibit.as_ref().map(Spanned::span),
+                ];
+                if let Some(span) = spans.into_iter().flatten().next() {
+                    let message = "only a change-of-state or cyclic connection has this";
+                    return Err(self.complaint(span, message.into()));
+                }
+                return Ok(match table.connection {
+                    Connection::Explicit => Exchange::Explicit,
+                    _ => Exchange::Poll,
+                });
+            }
+        };
+        let production_inhibit = match &table.production_inhibit {
+            None => 0,
+            Some(inhibit) => {
+                let millis = self.rate(inhibit, "production inhibit time")?;
+                if rate != 0 && millis > rate {
+                    let message = format!("it is longer than the expected packet rate, {rate}ms");
+                    return Err(self.complaint(inhibit.span(), message));
+                }
+                millis
+            }
+        };
+        let acknowledged = table.acknowledged.as_ref().is_none_or(|value| *value.get_ref());
+        Ok(Exchange::Change { trigger, acknowledged, production_inhibit })
+    }
+
     fn slave(&self, table: &SlaveTable) -> Result<SlavePlan, Complaint> {
         let mut slave = SlavePlan::poll(self.mac(&table.address, "")?);
-        if let Some(rate) = &table.expected_packet_rate {
-            let time = rate.get_ref().0;
-            let millis = u16::try_from(time.as_millis()).ok();
-            let whole = millis.filter(|_| time == Duration::from_millis(time.as_millis()));
-            slave.expected_packet_rate = whole.ok_or_else(|| {
-                let message = format!(
-                    "{} is no expected packet rate: it is 0 to 65535ms, in whole milliseconds",
-                    rate.get_ref()
-                );
-                self.complaint(rate.span(), message)
-            })?;
+        if table.connection == Connection::ChangeOfState {
+            slave.expected_packet_rate = 1_000;
         }
+        if let Some(rate) = &table.expected_packet_rate {
+            slave.expected_packet_rate = self.rate(rate, "expected packet rate")?;
+            if table.connection == Connection::Cyclic && slave.expected_packet_rate == 0 {
+                let message = "a cyclic slave needs an expected packet rate of at least 1ms";
+                return Err(self.complaint(rate.span(), message.into()));
+            }
+        }
+        slave.exchange = self.exchange(table, slave.expected_packet_rate)?;
         slave.assembly = table.assembly;
         slave.identity = match (&table.vendor, &table.product_code) {
             (None, None) => None,

@@ -3,7 +3,8 @@
 use codewheel_device::{Product, Snapshot};
 use codewheel_devicenet::MacId;
 use codewheel_devicenet::scanner::{
-    CycleTimes, DeviceIdentity, PollSettings, Scanner, ScannerIdentity, SlaveSettings, SlaveState,
+    ChangeSettings, CycleTimes, DeviceIdentity, PollSettings, Scanner, ScannerIdentity,
+    SlaveSettings, SlaveState,
 };
 use codewheel_link::BusUri;
 use codewheel_station::can::{BitRate, Filter, Frame, Input};
@@ -13,7 +14,7 @@ use crate::device::Device;
 use crate::fault::{Action, Agenda, Lever};
 use crate::keeper::Keeper;
 use crate::report::{Report, What};
-use crate::{BusPlan, MasterPlan, MemoryError};
+use crate::{BusPlan, Exchange, MasterPlan, MemoryError, SlavePlan};
 
 /// A bus at one moment.
 #[derive(Clone, Debug)]
@@ -356,11 +357,12 @@ impl Crew {
             let master = hand.master.and_then(|(master, mac)| {
                 let scanner = medium.station(count + master)?.scanner()?;
                 let slave = scanner.slave(mac)?;
-                let fresh = slave.responses.saturating_sub(hand.answers);
-                hand.answers = slave.responses;
+                let answers = slave.responses + slave.changes;
+                let fresh = answers.saturating_sub(hand.answers);
+                hand.answers = answers;
                 Some(SlaveSnapshot {
                     state: slave.state,
-                    position: position(slave.input),
+                    position: slave.latest().and_then(|(_, input)| position(input)),
                     answers_per_second: if window > 0.0 { fresh as f64 / window } else { 0.0 },
                     cycle: scanner.cycle_times(),
                 })
@@ -421,6 +423,26 @@ pub(crate) fn seed_at(seed: u32, place: usize) -> u64 {
     (u64::from(seed) << 32 | place as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
+fn slave_settings(slave: &SlavePlan) -> SlaveSettings {
+    let SlavePlan { mac, exchange, expected_packet_rate, assembly, identity } = *slave;
+    let identity = identity.map(|(vendor, product_code)| DeviceIdentity { vendor, product_code });
+    let mut settings = SlaveSettings { identity, ..SlaveSettings::explicit(mac) };
+    match exchange {
+        Exchange::Poll => settings.poll = Some(PollSettings { expected_packet_rate, assembly }),
+        Exchange::Change { trigger, acknowledged, production_inhibit } => {
+            settings.change = Some(ChangeSettings {
+                trigger,
+                acknowledged,
+                expected_packet_rate,
+                production_inhibit,
+                assembly,
+            });
+        }
+        Exchange::Explicit => {}
+    }
+    settings
+}
+
 fn scanner(plan: &MasterPlan, place: usize) -> Scanner {
     // No vendor has the code FFFF.
     let identity = ScannerIdentity { vendor: 0xFFFF, serial: place as u32 + 1 };
@@ -428,16 +450,7 @@ fn scanner(plan: &MasterPlan, place: usize) -> Scanner {
     scanner.set_interscan_delay(plan.interscan_delay);
     for slave in &plan.slaves {
         // A plan has no address twice, so there are never too many.
-        let _ = scanner.add(SlaveSettings {
-            poll: Some(PollSettings {
-                expected_packet_rate: slave.expected_packet_rate,
-                assembly: slave.assembly,
-            }),
-            identity: slave
-                .identity
-                .map(|(vendor, product_code)| DeviceIdentity { vendor, product_code }),
-            ..SlaveSettings::poll(slave.mac)
-        });
+        let _ = scanner.add(slave_settings(slave));
     }
     scanner
 }

@@ -342,10 +342,20 @@ pub(crate) struct SlaveTable {
     #[serde(default)]
     pub(crate) connection: Connection,
     /// The expected packet rate, 0 to 65535ms in whole milliseconds; after four times as long the
-    /// connection times out. Default 200ms; 0s: never.
+    /// connection times out, and change-of-state and cyclic slaves produce at least this often.
+    /// Default 200ms, 1s for change-of-state; 0s: never. A cyclic slave needs at least 1ms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<TimeSpan>")]
     pub(crate) expected_packet_rate: Option<Spanned<TimeSpan>>,
+    /// For change-of-state and cyclic: whether each production is acknowledged. Default true.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<bool>")]
+    pub(crate) acknowledged: Option<Spanned<bool>>,
+    /// For change-of-state and cyclic: the shortest pause between two productions, at most the
+    /// expected packet rate. Default 0s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<TimeSpan>")]
+    pub(crate) production_inhibit: Option<Spanned<TimeSpan>>,
     /// What it shall produce; of these encoders assembly 1, the position, or 2, position and flags.
     /// Default: what it has kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -367,6 +377,12 @@ pub(crate) enum Connection {
     /// The master asks and the slave answers.
     #[default]
     Poll,
+    /// The slave produces what changes, and at the expected packet rate.
+    ChangeOfState,
+    /// The slave produces at the expected packet rate.
+    Cyclic,
+    /// The slave is only kept reachable; no I/O data.
+    Explicit,
 }
 
 /// The JSON Schema of plant files, as text that ends with a line feed.

@@ -27,7 +27,7 @@ pub use crew::{BusSnapshot, DeviceSnapshot, MasterSnapshot, SlaveSnapshot};
 pub use fault::{Fault, Lever};
 pub use file::schema;
 pub use memory::{Found, MemoryError, MemoryFile};
-pub use plant::{BusPlan, DevicePlan, MasterPlan, Plant, SlavePlan};
+pub use plant::{BusPlan, DevicePlan, Exchange, MasterPlan, Plant, SlavePlan};
 pub use port_bus::{PortBus, StartError};
 pub use report::{Report, What};
 pub use running::Running;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use codewheel_device::{Product, Switches};
 use codewheel_devicenet::MacId;
+use codewheel_devicenet::scanner::Trigger;
 use codewheel_link::BusUri;
 use codewheel_sim::can::Faults;
 use codewheel_sim::shaft::Shaft;
@@ -84,11 +85,31 @@ pub struct MasterPlan {
     pub slaves: Vec<SlavePlan>,
 }
 
+/// How the data of a slave is fetched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exchange {
+    /// The master asks and the slave answers.
+    Poll,
+    /// The slave produces of its own accord.
+    Change {
+        /// What makes it produce.
+        trigger: Trigger,
+        /// Whether each production is acknowledged.
+        acknowledged: bool,
+        /// The shortest pause between two productions in ms; 0: none.
+        production_inhibit: u16,
+    },
+    /// The slave is only kept reachable.
+    Explicit,
+}
+
 /// One line of a scan list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlavePlan {
     /// Its address.
     pub mac: MacId,
+    /// How its data is fetched.
+    pub exchange: Exchange,
     /// The expected packet rate in ms; 0: no time-out.
     pub expected_packet_rate: u16,
     /// The assembly it shall produce; `None` leaves what it has kept.
@@ -101,7 +122,8 @@ impl SlavePlan {
     /// Polls `mac`, whatever it is, with an expected packet rate of 200 ms.
     #[must_use]
     pub const fn poll(mac: MacId) -> Self {
-        Self { mac, expected_packet_rate: 200, assembly: None, identity: None }
+        let exchange = Exchange::Poll;
+        Self { mac, exchange, expected_packet_rate: 200, assembly: None, identity: None }
     }
 }
 

@@ -1,6 +1,7 @@
 //! From a plant to the text of a plant file, every default filled in.
 
 use codewheel_device::Switches;
+use codewheel_devicenet::scanner::Trigger;
 use codewheel_station::can::BitRate;
 use codewheel_station::{Duration, Instant};
 use toml::Spanned;
@@ -10,7 +11,7 @@ use crate::file::{
     BusKind, BusTable, Connection, DeviceTable, FaultKind, FaultTable, MasterKind, MasterTable,
     PlantFile, SlaveTable, SwitchTable, SwitchesValue,
 };
-use crate::{BusPlan, DevicePlan, MasterPlan, Plant, SlavePlan, TimeSpan};
+use crate::{BusPlan, DevicePlan, Exchange, MasterPlan, Plant, SlavePlan, TimeSpan};
 
 /// The text of a plant file.
 pub(crate) fn print(plant: &Plant) -> String {
@@ -128,11 +129,24 @@ fn master_table(master: &MasterPlan, bus: &BusPlan) -> MasterTable {
 }
 
 fn slave_table(slave: &SlavePlan) -> SlaveTable {
-    let rate = Duration::from_millis(u64::from(slave.expected_packet_rate));
+    let millis = |millis: u16| value(TimeSpan(Duration::from_millis(u64::from(millis))));
+    let (connection, acknowledged, production_inhibit) = match slave.exchange {
+        Exchange::Poll => (Connection::Poll, None, None),
+        Exchange::Explicit => (Connection::Explicit, None, None),
+        Exchange::Change { trigger, acknowledged, production_inhibit } => {
+            let connection = match trigger {
+                Trigger::ChangeOfState => Connection::ChangeOfState,
+                Trigger::Cyclic => Connection::Cyclic,
+            };
+            (connection, Some(value(acknowledged)), Some(millis(production_inhibit)))
+        }
+    };
     SlaveTable {
         address: value(slave.mac.value().into()),
-        connection: Connection::Poll,
-        expected_packet_rate: Some(value(TimeSpan(rate))),
+        connection,
+        expected_packet_rate: Some(millis(slave.expected_packet_rate)),
+        acknowledged,
+        production_inhibit,
         assembly: slave.assembly,
         vendor: slave.identity.map(|(vendor, _)| value(vendor)),
         product_code: slave.identity.map(|(_, code)| value(code)),

@@ -220,3 +220,17 @@ fn no_text_panics() {
         }
     }
 }
+
+#[test]
+fn a_connection_takes_only_what_belongs_to_it() {
+    let slave = |line: &str| {
+        format!("{BUS}[[master]]\naddress = 0\n[[master.slave]]\naddress = 5\n{line}\n")
+    };
+    refused(&slave("connection = \"bit-strobe\""), 7, "\"bit-strobe\"", &["change-of-state"]);
+    refused(&slave("acknowledged = true"), 7, "true", &["only a change-of-state or cyclic"]);
+    let cyclic = "connection = \"cyclic\"\nexpected_packet_rate = \"0s\"";
+    refused(&slave(cyclic), 8, "\"0s\"", &["at least 1ms"]);
+    let inhibited = "connection = \"change-of-state\"\nexpected_packet_rate = \"10ms\"\n\
+                     production_inhibit = \"11ms\"";
+    refused(&slave(inhibited), 9, "\"11ms\"", &["longer than the expected packet rate, 10ms"]);
+}

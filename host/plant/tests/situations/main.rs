@@ -1,6 +1,7 @@
 //! Plants as their users meet them: files, faults, ports.
 
 mod complaints;
+mod connections;
 mod examples;
 mod faults;
 mod one_port;
