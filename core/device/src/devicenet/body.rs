@@ -5,7 +5,7 @@ use codewheel_devicenet::{
     Application, Class, Done, Identity, MacId, NetworkSettings, Request, Reset, Server,
     SwitchPositions,
 };
-use codewheel_encoder::{Block, Encoder, Sensor, Start};
+use codewheel_encoder::{Block, Encoder, Sensor, Settings, Start};
 use codewheel_station::{Deadline, Duration, Instant, Writer};
 
 use super::Factory;
@@ -256,8 +256,16 @@ impl<S: Sensor> Body<S> {
     }
 
     fn load(&mut self, block: Block) -> Result<(), Error> {
-        self.produce_anyway = true;
-        self.encoder.load(block).map_err(|_| GeneralStatus::NO_STORED_DATA.into())
+        let before = self.measure();
+        self.encoder.load(block).map_err(|_| Error::from(GeneralStatus::NO_STORED_DATA))?;
+        self.produce_anyway |= before != self.measure();
+        Ok(())
+    }
+
+    /// What the position is measured by: where it really changes, the position is produced however
+    /// little it moved.
+    fn measure(&self) -> (Settings, i32) {
+        (self.encoder.settings(), self.encoder.offset())
     }
 }
 
@@ -370,10 +378,13 @@ impl<S: Sensor> Application for Body<S> {
         let value = row.decode(data)?;
         // A preset takes effect at the position of this very moment.
         self.sample(now);
+        let before = self.measure();
         let changed = write(&mut self.encoder, value)
             .map_err(|_| Error::from(GeneralStatus::INVALID_ATTRIBUTE_VALUE))?;
-        self.produce_anyway |= changed;
+        self.produce_anyway |= before != self.measure();
         if row.attribute == PRESET {
+            // Every preset is produced, also one that finds its value in place.
+            self.produce_anyway = true;
             self.events.push(now, Event::Preset);
         } else if changed {
             self.events.push(now, Event::SettingChanged { attribute: row.attribute });

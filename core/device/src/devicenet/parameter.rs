@@ -19,7 +19,7 @@ const CLASS_DESCRIPTOR: u16 = 0x000F;
 /// Class attribute 9: there is no configuration assembly.
 const NO_CONFIGURATION_ASSEMBLY: u16 = 0;
 /// Class attribute 10: English.
-const NATIVE_LANGUAGE: u8 = 1;
+const NATIVE_LANGUAGE: u8 = 0;
 
 /// Instance attribute 4: the value has names.
 const ENUMERATED: u16 = 1 << 1;
