@@ -113,3 +113,78 @@ fn switches_turned_while_running_act_at_the_next_power_up() {
     assert_eq!(bench.device.mac().map(|mac| mac.value()), Some(23));
     assert_eq!(bench.collect(), ["4BF#00D401D2040000"]);
 }
+
+fn colours(bench: &mut Bench, quarters: usize) -> Vec<Colour> {
+    let mut seen = Vec::new();
+    for _ in 0..quarters {
+        seen.push(bench.device.snapshot(bench.now).colour);
+        bench.wait(Duration::from_millis(250));
+    }
+    seen
+}
+
+#[test]
+fn the_self_test_is_green_then_red_at_each_power_on() {
+    use Colour::{Dark, Green, Red};
+    let mut bench = Bench::power_up("amg11-d29");
+    bench.collect();
+    assert_eq!(colours(&mut bench, 8), [Green, Red, Dark, Dark, Dark, Dark, Dark, Dark]);
+    assert_eq!(colours(&mut bench, 4), [Green, Green, Dark, Dark], "on-line, no connection");
+    bench.device.power_cycle(bench.now);
+    bench.collect();
+    assert_eq!(colours(&mut bench, 3), [Green, Red, Dark]);
+}
+
+#[test]
+fn a_change_of_state_connection_that_timed_out_flashes_red_until_it_is_none() {
+    use Colour::{Dark, Green, Red};
+    let mut bench = Bench::power_up("amg11-d29").allocated();
+    bench.asks("4B 03 01 10 0A", "CB 00");
+    assert_eq!(lamp(&bench), Lamp::Green);
+    bench.asks("10 05 04 09 64 00", "90 6400");
+    // The first interval: ten seconds, although the poll connection is well.
+    bench.wait(Duration::from_nanos(9_999_999_999));
+    assert_eq!(lamp(&bench), Lamp::Green);
+    bench.wait(Duration::from_nanos(1));
+    assert_eq!(lamp(&bench), Lamp::RedFlashing);
+    let since_power_up = bench.now.as_nanos() % 500_000_000;
+    bench.wait(Duration::from_nanos(1_000_000_000 - since_power_up));
+    let seen = colours(&mut bench, 8);
+    assert_eq!(seen.iter().filter(|colour| **colour == Red).count(), 4, "half the time: {seen:?}");
+    assert_eq!(seen.iter().filter(|colour| **colour == Dark).count(), 4);
+    assert_eq!(seen[0], seen[1]);
+    // Revived by a Reset, and acknowledged from then on.
+    bench.asks("05 05 04", "85");
+    bench.says("42A#", &[]);
+    assert_eq!((lamp(&bench), colours(&mut bench, 1)), (Lamp::Green, vec![Green]));
+    bench.wait(Duration::from_millis(400));
+    assert_eq!(lamp(&bench), Lamp::RedFlashing);
+    bench.asks("4C 03 01 10", "CC");
+    assert_eq!(lamp(&bench), Lamp::Green);
+}
+
+#[test]
+fn an_unacknowledged_connection_leaves_the_lamp_green_for_ever() {
+    let mut bench = Bench::power_up("amg11-d29").allocated();
+    bench.asks("4B 03 01 50 0A", "CB 00");
+    bench.asks("10 05 04 09 E8 03", "90 E803");
+    bench.wait(Duration::from_secs(1_000));
+    assert_eq!(lamp(&bench), Lamp::Green);
+}
+
+#[test]
+fn a_bus_off_is_red_and_with_interrupt_1_dark_until_the_check_is_passed() {
+    let mut bench = Bench::power_up("amg11-d29").allocated();
+    bench.device.handle(bench.now, Input::BusOff);
+    bench.device.handle(bench.now, Input::Recovered);
+    assert_eq!(lamp(&bench), Lamp::Red);
+    let mut bench = Bench::power_up("amg11-d29").allocated();
+    bench.asks("10 03 01 03 01", "90");
+    bench.device.handle(bench.now, Input::BusOff);
+    assert_eq!(lamp(&bench), Lamp::Red);
+    bench.device.handle(bench.now, Input::Recovered);
+    assert_eq!(lamp(&bench), Lamp::Off);
+    bench.collect();
+    bench.wait(Duration::from_secs(2));
+    assert_eq!(lamp(&bench), Lamp::GreenFlashing);
+}

@@ -33,6 +33,8 @@ pub(crate) struct Bench {
     /// Whether the memory takes records at once.
     pub(crate) serves_memory: bool,
     pub(crate) records: u32,
+    /// What came on other identifiers while an explicit answer was waited for.
+    pub(crate) productions: Vec<String>,
 }
 
 pub(crate) const SERIAL: u32 = 1234;
@@ -57,7 +59,14 @@ impl Bench {
             &start(&memory),
             hand,
         );
-        Self { device, memory, now: Instant::ZERO, serves_memory: true, records: 0 }
+        Self {
+            device,
+            memory,
+            now: Instant::ZERO,
+            serves_memory: true,
+            records: 0,
+            productions: Vec::new(),
+        }
     }
 
     /// Takes the power away and gives it back: what the memory holds is all that is left.
@@ -138,7 +147,7 @@ impl Bench {
         let mut incoming = Vec::new();
         for data in frames {
             self.device.handle(self.now, Input::Frame(&Frame::standard(0x42C, &data)));
-            incoming = self.collect();
+            incoming = self.explicit_answers();
             if fragmented {
                 incoming.remove(0);
             }
@@ -155,12 +164,41 @@ impl Bench {
                     if octet >> 6 == 2 {
                         return Some(hex(&answer));
                     }
-                    incoming = self.collect();
+                    incoming = self.explicit_answers();
                 }
                 ref other => panic!("not an explicit message: {other:02X?}"),
             }
         }
         None
+    }
+
+    /// What the device says on its explicit connection; productions are laid aside.
+    fn explicit_answers(&mut self) -> Vec<String> {
+        let (explicit, others): (Vec<_>, Vec<_>) =
+            self.collect().into_iter().partition(|frame| frame.starts_with("42B#"));
+        self.productions.extend(others);
+        explicit
+    }
+
+    /// Asks, and returns what was produced meanwhile.
+    #[track_caller]
+    pub(crate) fn produces_when_asked(&mut self, request: &str) -> Vec<String> {
+        self.productions.clear();
+        let answer = self.ask(request).expect("an answer");
+        assert!(!answer.starts_with("94"), "{request} is refused with {answer}");
+        std::mem::take(&mut self.productions)
+    }
+
+    /// A frame arrives; what the device has to say waits for the wire.
+    pub(crate) fn hears(&mut self, candump: &str) {
+        let frame = codewheel_sim::can::parse_frame(candump).expect("candump notation");
+        self.device.handle(self.now, Input::Frame(&frame));
+    }
+
+    /// The shaft stands at `code` now; what the device produces of it.
+    pub(crate) fn turned_to(&mut self, code: u32) -> Vec<String> {
+        self.turn_to(code);
+        self.collect()
     }
 
     #[track_caller]
@@ -204,7 +242,7 @@ impl Bench {
     }
 }
 
-fn octets(text: &str) -> Vec<u8> {
+pub(crate) fn octets(text: &str) -> Vec<u8> {
     let digits: String = text.chars().filter(|c| !c.is_whitespace()).collect();
     let pair = |at| u8::from_str_radix(&digits[at..at + 2], 16).expect("hexadecimal");
     (0..digits.len()).step_by(2).map(pair).collect()

@@ -134,6 +134,16 @@ fn whatever_was_owed_is_dropped_when_the_node_falls_silent() {
     assert_eq!(bench.collect(), [""; 0]);
     assert_eq!(bench.wait(Duration::from_secs(100)), [""; 0]);
     assert_eq!(bench.node.deadline(), None);
+    // Nor does any of it come once the node is back.
+    let mut bench = Bench::with(0x13);
+    bench.asks("10 03 01 03 01", "90");
+    bench.hears("42E#0B4B0301030B");
+    bench.hears("42C#0A0E010101");
+    leaves_the_bus(&mut bench);
+    recovers(&mut bench);
+    assert_eq!(bench.collect(), [CHECK]);
+    assert_eq!(bench.wait(Duration::from_secs(100)), [CHECK]);
+    assert_eq!(bench.node.server.status(), NetworkStatus::OnLine);
 }
 
 #[test]
