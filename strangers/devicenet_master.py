@@ -1,8 +1,9 @@
 """A DeviceNet master for one slave, written from the book alone, over python-can.
 
 It speaks to a Group 2 Only Server: duplicate MAC ID check, allocation of the predefined
-master/slave connection set, explicit messages with fragmentation both ways, poll. It shares no
-line with the slave it judges. Numbers in comments are hexadecimal where the book has them so.
+master/slave connection set, explicit messages with fragmentation both ways, poll, change of state
+and cyclic with their acknowledge, heartbeat. It shares no line with the slave it judges. Numbers in
+comments are hexadecimal where the book has them so.
 
 Whatever does not go by the book raises `BookViolation`, silence raises `Silence`, and an error
 response raises `Refused`; each says what was sent and what came back.
@@ -19,20 +20,27 @@ from typing import TextIO
 import can
 
 # Services
+GET_ALL = 0x01
 RESET = 0x05
+APPLY = 0x0D
 GET = 0x0E
 SET = 0x10
 RESTORE = 0x15
 SAVE = 0x16
 ALLOCATE = 0x4B
+GET_ENUM_STRING = 0x4B
 RELEASE = 0x4C
 ERROR = 0x94
 
 # Allocation choice bits
 EXPLICIT = 0x01
 POLL = 0x02
+CHANGE_OF_STATE = 0x10
+CYCLIC = 0x20
+UNACKNOWLEDGED = 0x40
 
 # Group 2 message numbers
+ACKNOWLEDGE_COMMAND = 2
 RESPONSE = 3
 REQUEST = 4
 POLL_COMMAND = 5
@@ -89,6 +97,11 @@ def group_2(mac: int, message: int) -> int:
 def poll_response_identifier(mac: int) -> int:
     """The identifier of group 1 message 15 (poll response): 0 1111 mac."""
     return 0x3C0 | mac
+
+
+def change_of_state_identifier(mac: int) -> int:
+    """The identifier of group 1 message 13 (change of state or cyclic): 0 1101 mac."""
+    return 0x340 | mac
 
 
 @dataclass
@@ -168,6 +181,31 @@ class DuplicateMacCheck:
         )
 
 
+@dataclass
+class Heartbeat:
+    """A device heartbeat message: 8 octets on the identifier of the explicit responses."""
+
+    at: float
+    instance: int
+    state: int
+    flags: int
+    consistency: int
+
+    @staticmethod
+    def is_one(frame: Frame, mac: int) -> bool:
+        """Its header carries the MAC ID of the device itself, and the service is CD."""
+        return frame.identifier == group_2(mac, RESPONSE) and frame.data[:2] == bytes([mac, 0xCD])
+
+    @classmethod
+    def parse(cls, frame: Frame) -> Heartbeat:
+        """[MAC] [CD] [instance] [state] [flags] [configuration consistency value]."""
+        data = frame.data
+        if len(data) != 8:
+            raise BookViolation(f"a device heartbeat has 8 octets, got {frame}")
+        instance, consistency = (int.from_bytes(data[at : at + 2], "little") for at in (2, 6))
+        return cls(frame.at, instance, data[4], data[5], consistency)
+
+
 class Master:
     """A master with MAC ID `own` that speaks to the slave with MAC ID `slave`."""
 
@@ -187,7 +225,7 @@ class Master:
     def ask_duplicate_mac(self, vendor: int, serial: int) -> DuplicateMacCheck:
         """Claims the slave's MAC ID, as a newcomer does; returns the slave's objection."""
         claim = DuplicateMacCheck(False, 0, vendor, serial)
-        self._forget()
+        self.forget()
         self.wire.send(group_2(self.slave, DUPLICATE_MAC), claim.octets())
         frame = self._expect(group_2(self.slave, DUPLICATE_MAC), 1.0, "objection to its MAC ID")
         return DuplicateMacCheck.parse(frame)
@@ -202,8 +240,7 @@ class Master:
 
     def allocate(self, choice: int) -> None:
         """Allocates connections. Only `CB 00` (message body format 8/8) is a success."""
-        body = bytes([ALLOCATE, 3, 1, choice, self.own])
-        answer = self.unconnected(body)
+        answer = self.unconnected(bytes([ALLOCATE, 3, 1, choice, self.own]))
         if answer != bytes([ALLOCATE | 0x80, 0]):
             raise BookViolation(f"Allocate is answered CB 00, got {answer.hex(' ')}")
 
@@ -215,7 +252,7 @@ class Master:
 
     def unconnected(self, body: bytes) -> bytes:
         """Any request on the Group 2 only port."""
-        self._forget()
+        self.forget()
         self.wire.send(group_2(self.slave, UNCONNECTED_REQUEST), bytes([self._header()]) + body)
         return self._checked(body, self._receive_body(self.RESPONSE_SECONDS))
 
@@ -235,7 +272,7 @@ class Master:
 
     def explicit(self, body: bytes, repeat_fragments: bool = False) -> bytes:
         """Any message body over the explicit connection; returns the body of the response."""
-        self._forget()
+        self.forget()
         self.send_explicit(body, repeat_fragments)
         return self._checked(body, self._receive_body(self.RESPONSE_SECONDS))
 
@@ -310,14 +347,14 @@ class Master:
     def get_without_first_acknowledge(self, class_id: int, instance: int, attribute: int) -> bytes:
         """A Get whose fragmented response loses its first acknowledge, so it must be repeated."""
         body = bytes([GET, class_id, instance, attribute])
-        self._forget()
+        self.forget()
         self.send_explicit(body)
         answer = self._receive_body(self.RESPONSE_SECONDS, ignore_first_fragment=True)
         return self._checked(body, answer)[1:]
 
     def expect_no_response(self, body: bytes, seconds: float = 0.5) -> None:
         """Sends an explicit request that must stay without an answer."""
-        self._forget()
+        self.forget()
         self.wire.send(group_2(self.slave, REQUEST), bytes([self._header()]) + body)
         self._expect_nothing(group_2(self.slave, RESPONSE), seconds, "explicit response")
 
@@ -325,7 +362,7 @@ class Master:
 
     def poll(self) -> Frame:
         """Polls once and returns the response; a second response is a violation."""
-        self._forget()
+        self.forget()
         self.wire.send(group_2(self.slave, POLL_COMMAND), b"")
         identifier = poll_response_identifier(self.slave)
         response = self._expect(identifier, 0.5, "poll response")
@@ -334,9 +371,45 @@ class Master:
 
     def expect_no_poll_response(self, data: bytes = b"", seconds: float = 0.4) -> None:
         """Polls a connection that must not answer."""
-        self._forget()
+        self.forget()
         self.wire.send(group_2(self.slave, POLL_COMMAND), data)
         self._expect_nothing(poll_response_identifier(self.slave), seconds, "poll response")
+
+    # --- Change of state and cyclic
+
+    def listen(self, seconds: float, acknowledge: bool = False) -> list[Frame]:
+        """What the change of state or cyclic connection produces in `seconds`."""
+        identifier = change_of_state_identifier(self.slave)
+        deadline = time.time() + seconds
+        heard = []
+        while (left := deadline - time.time()) > 0:
+            frame = self._next(lambda frame: frame.identifier == identifier, left)
+            if frame is not None:
+                heard.append(frame)
+                if acknowledge:
+                    self.acknowledge()
+        return heard
+
+    def next_production(self, seconds: float) -> Frame:
+        """The next frame of the change of state or cyclic connection."""
+        return self._expect(change_of_state_identifier(self.slave), seconds, "production")
+
+    def acknowledge(self, data: bytes = b"") -> Frame:
+        """The master's acknowledge; only an empty one counts."""
+        return self.wire.send(group_2(self.slave, ACKNOWLEDGE_COMMAND), data)
+
+    # --- Heartbeat
+
+    def heartbeats(self, seconds: float) -> list[Heartbeat]:
+        """The device heartbeats of the next `seconds`."""
+        self.forget()
+        deadline = time.time() + seconds
+        heard = []
+        while (left := deadline - time.time()) > 0:
+            frame = self._next(lambda frame: Heartbeat.is_one(frame, self.slave), left)
+            if frame is not None:
+                heard.append(Heartbeat.parse(frame))
+        return heard
 
     # --- Below
 
@@ -357,11 +430,13 @@ class Master:
             )
         return answer
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
         """Drops what arrived before the next request, so an old answer is never taken for a new."""
         self._waiting.clear()
+        # An encoder that produces all the time never leaves the bus silent.
+        deadline = time.time() + 0.05
         # python-can's slcan reads octet by octet: with no time at all it never completes a frame.
-        while self.wire.receive(0.005) is not None:
+        while self.wire.receive(0.005) is not None and time.time() < deadline:
             pass
 
     def _next(self, wanted: Callable[[Frame], bool], seconds: float) -> Frame | None:
@@ -379,8 +454,12 @@ class Master:
             self._waiting.append(arrived)
         return None
 
+    def _is_answer(self, frame: Frame, identifier: int) -> bool:
+        """Heartbeats come in between, under the identifier of the responses."""
+        return frame.identifier == identifier and not Heartbeat.is_one(frame, self.slave)
+
     def _expect(self, identifier: int, seconds: float, what: str) -> Frame:
-        frame = self._next(lambda frame: frame.identifier == identifier, seconds)
+        frame = self._next(lambda frame: self._is_answer(frame, identifier), seconds)
         if frame is None:
             others = ", ".join(str(frame) for frame in self._waiting) or "nothing"
             raise Silence(
@@ -390,6 +469,6 @@ class Master:
         return frame
 
     def _expect_nothing(self, identifier: int, seconds: float, what: str) -> None:
-        frame = self._next(lambda frame: frame.identifier == identifier, seconds)
+        frame = self._next(lambda frame: self._is_answer(frame, identifier), seconds)
         if frame is not None:
             raise BookViolation(f"no {what} is due here, got {frame}")

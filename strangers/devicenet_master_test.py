@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 import unittest
+import unittest.mock
 
 import can
 
@@ -67,7 +68,9 @@ class MasterGoesByTheBook(unittest.TestCase):
     def test_identifiers_are_those_of_the_table(self) -> None:
         self.assertEqual(book.group_2(5, book.UNCONNECTED_REQUEST), 0x42E)
         self.assertEqual(book.group_2(63, book.DUPLICATE_MAC), 0x5FF)
+        self.assertEqual(book.group_2(5, book.ACKNOWLEDGE_COMMAND), 0x42A)
         self.assertEqual(book.poll_response_identifier(5), 0x3C5)
+        self.assertEqual(book.change_of_state_identifier(5), 0x345)
 
     def test_a_claim_to_the_mac_id_is_objected_to(self) -> None:
         master, _ = self.against({"42F#00010002000000": ["42F#80D401D2040000"]})
@@ -154,6 +157,43 @@ class MasterGoesByTheBook(unittest.TestCase):
         silent, _ = self.against({})
         with self.assertRaisesRegex(book.Silence, "no poll response .3C5. of MAC ID 5"):
             silent.poll()
+
+    def test_what_is_produced_is_acknowledged_with_an_empty_frame(self) -> None:
+        master, slave = self.against(
+            {"42D#": ["345#00100000"], "42A#": ["345#01100000", "3C5#0110"]}
+        )
+        master.wire.send(0x42D, b"")
+        heard = master.listen(0.2, acknowledge=True)
+        self.assertEqual([str(frame) for frame in heard[:2]], ["345#00100000", "345#01100000"])
+        slave.stop()
+        self.assertEqual(slave.heard[:2], ["42D#", "42A#"])
+
+    def test_a_heartbeat_is_never_taken_for_a_response(self) -> None:
+        master, _ = self.against({"42C#3F0E010101": ["42B#05CD010003001234", "42B#3F8ED401"]})
+        self.assertEqual(master.get(1, 1, 1), b"\xd4\x01")
+        master, _ = self.against({"42D#": ["42B#05CD010003001234", "42B#3F8ED401"]})
+        master.wire.send(0x42D, b"")
+        # The script answered at once; that must not be dropped.
+        with unittest.mock.patch.object(master, "forget"):
+            heart = master.heartbeats(0.2)
+        self.assertEqual([(h.instance, h.state, h.flags) for h in heart], [(1, 3, 0)])
+        self.assertEqual(heart[0].consistency, 0x3412)
+
+    def test_a_master_gets_through_while_the_slave_produces_all_the_time(self) -> None:
+        master, slave = self.against({"42C#3F0E010101": ["42B#3F8ED401"]})
+        chatter = threading.Event()
+
+        def produce() -> None:
+            while not chatter.wait(0.001):
+                slave._bus.send(can.Message(arbitration_id=0x345, is_extended_id=False))
+
+        thread = threading.Thread(target=produce)
+        thread.start()
+        try:
+            self.assertEqual(master.get(1, 1, 1), b"\xd4\x01")
+        finally:
+            chatter.set()
+            thread.join()
 
 
 if __name__ == "__main__":

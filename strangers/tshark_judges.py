@@ -1,7 +1,8 @@
 """Lets Wireshark's DeviceNet dissector judge a session: every frame must be one it knows.
 
-Usage: tshark_judges.py LOG          judge a candump -L style log
-       tshark_judges.py --self-test  show that the judge accepts good frames and refuses bad ones
+Usage: tshark_judges.py session LOG     judge the candump -L style log of devicenet_session.py
+       tshark_judges.py chapters LOG…  the logs of devicenet_chapters.py, together one walk
+       tshark_judges.py --self-test    show that the judge accepts good frames and refuses bad ones
 
 Two passes. In the first one the frames are as they were: tshark names each message by its
 identifier and reads the duplicate MAC ID checks. It does not look into the explicit messages of
@@ -29,14 +30,15 @@ REQUEST = "Master's Explicit Request Messages"
 RESPONSE = "Slave's Explicit/Unconnected Response Messages"
 POLL_COMMAND = "Master's I/O Poll Command/COS/Cyclic Messages"
 POLL_RESPONSE = "Slave's I/O Poll Response or COS/Cyclic Ack Message"
-EXPECTED = (DUPLICATE_MAC, UNCONNECTED, REQUEST, RESPONSE, POLL_COMMAND, POLL_RESPONSE)
-ALLOWED = (
-    *EXPECTED,
-    "Slave's I/O Change of State or Cyclic Message",
-    "Master's Change of State or Cyclic Acknowledge Message",
-)
+CHANGE_OF_STATE = "Slave's I/O Change of State or Cyclic Message"
+CHANGE_ACKNOWLEDGE = "Master's Change of State or Cyclic Acknowledge Message"
+HEARTBEAT = "Device Heartbeat Message - Response"
+EXPLICIT_AND_POLL = (DUPLICATE_MAC, UNCONNECTED, REQUEST, RESPONSE, POLL_COMMAND, POLL_RESPONSE)
+ALLOWED = (*EXPLICIT_AND_POLL, CHANGE_OF_STATE, CHANGE_ACKNOWLEDGE)
+# Octets that a message of ours must have, where it is not any number.
+LENGTHS = {DUPLICATE_MAC: (7,), CHANGE_OF_STATE: (4, 5), POLL_RESPONSE: (4, 5)}
 
-EXPECTED_SERVICES = (
+SERVICES = (
     "Get Attribute Single - Request",
     "Get Attribute Single - Response",
     "Set Attribute Single - Response",
@@ -47,6 +49,18 @@ EXPECTED_SERVICES = (
     "Reset - Request",
     "Reset - Response",
 )
+# What must be seen of each walk, so that no half of it is missed.
+EXPECTED = {
+    "session": (*EXPLICIT_AND_POLL, *SERVICES),
+    "chapters": (
+        *ALLOWED,
+        *SERVICES,
+        HEARTBEAT,
+        "Apply Attributes - Request",
+        "Apply Attributes - Response",
+        "Get Attributes All - Request",
+    ),
+}
 # The dissector does not know the error response (94); it takes Allocate (4B) and Release (4C) for
 # the open and close services of group 3, and so the short response to Allocate for a broken one.
 # These are judged by the session itself. A service that neither knows goes through, so that its
@@ -153,8 +167,10 @@ def judge_identifiers(frames: list[Frame]) -> tuple[Counter[str], list[str]]:
     for frame, verdict in zip(frames, ask_tshark(frames), strict=True):
         names[verdict.info] += 1
         found += complaints(frame, verdict, ALLOWED)
-        if verdict.info == DUPLICATE_MAC and len(frame.data) != 7:
-            found.append(f"{frame}: a duplicate MAC ID check message has 7 octets")
+        lengths = LENGTHS.get(verdict.info)
+        if lengths is not None and len(frame.data) not in lengths:
+            due = " or ".join(str(length) for length in lengths)
+            found.append(f"{frame}: '{verdict.info}' has {due} octets")
     return names, found
 
 
@@ -180,11 +196,13 @@ def judge_services(frames: list[Frame], tried: frozenset[int]) -> tuple[Counter[
         found += complaints(frame, verdict, None)
         if "Unknown" in verdict.info:
             found.append(f"{frame}: {verdict.info}")
+        if verdict.info == HEARTBEAT and len(frame.data) != 8:
+            found.append(f"{frame}: '{HEARTBEAT}' has 8 octets")
     return names, found
 
 
 def judge(
-    frames: list[Frame], tried: frozenset[int] = frozenset()
+    frames: list[Frame], expected: tuple[str, ...], tried: frozenset[int] = frozenset()
 ) -> tuple[Counter[str], list[str]]:
     """What tshark saw, and all complaints, those about what the session lacks included."""
     if not frames:
@@ -192,14 +210,15 @@ def judge(
     messages, found = judge_identifiers(frames)
     services, more = judge_services(frames, tried)
     found += more
-    found += [f"tshark saw no '{name}'" for name in EXPECTED if not messages[name]]
-    found += [f"tshark saw no '{name}'" for name in EXPECTED_SERVICES if not services[name]]
-    return messages + services, found
+    seen = messages + services
+    found += [f"tshark saw no '{name}'" for name in expected if not seen[name]]
+    return seen, found
 
 
 GOOD = """\
 42F#00D401D2040000 42F#80D401D2040000 42E#3F4B0301033F 42B#3FCB00 42C#3F0E010101 42B#3F8ED401
 42C#BF00102F010A1027 42B#BFC000 42C#BF810000 42B#BFC100 42B#3F90 42B#3F9414FF
+42C#3F010F01 42C#3F0D0504 42B#3F8D45032A04 345#00100000 42A# 345#0010000003 42B#05CD010003001234
 42C#3F162F01 42B#3F96 42C#3F152F01 42B#3F95 42C#3F052F01 42B#3F85 42D# 3C5#00100000
 42E#3F4C030101 42B#3FCC"""
 
@@ -209,6 +228,9 @@ BAD = {
     "7D1#00D401D2040000": "Reserved Group 4 Message",
     "42F#00D4": "Malformed",
     "42F#00D401D204000000": "has 7 octets",
+    "345#001000": "has 4 or 5 octets",
+    "3C5#": "has 4 or 5 octets",
+    "42B#05CD01000300": "has 8 octets",
     "0C5#00100000": "Other Group 1 Message",
     "605#3F0E0101": "no message of the predefined connection set",
     "42B#3FF7": "Unknown Service Code",
@@ -226,7 +248,8 @@ def from_words(words: str) -> list[Frame]:
 
 def self_test() -> None:
     """Fails where the judge is too strict or too kind."""
-    _, found = judge(from_words(GOOD))
+    expected = EXPECTED["chapters"]
+    _, found = judge(from_words(GOOD), expected)
     if found:
         raise SystemExit("the judge refuses good frames:\n  " + "\n  ".join(found))
     for bad, words in BAD.items():
@@ -235,10 +258,10 @@ def self_test() -> None:
         found = first + second
         if not found or not any(bad[3:] in line and words in line for line in found):
             raise SystemExit(f"the judge accepts {bad}, which is wrong ({words}); it says {found}")
-    lacking = GOOD.replace("42D#", "").replace("42C#3F162F01", "")
-    _, found = judge(from_words(lacking))
-    if len(found) != 2:
-        raise SystemExit(f"the judge misses that poll and save are lacking; it says {found}")
+    lacking = GOOD.replace("42D#", "").replace("42C#3F162F01", "").replace("42A#", "")
+    _, found = judge(from_words(lacking), expected)
+    if len(found) != 3:
+        raise SystemExit(f"the judge misses that poll, save, acknowledge lack; it says {found}")
     print(f"the judge accepts the good frames, refuses {len(BAD)} bad ones, misses what is lacking")
 
 
@@ -247,16 +270,16 @@ def main(arguments: list[str]) -> None:
     if arguments == ["--self-test"]:
         self_test()
         return
-    if len(arguments) != 1 or arguments[0].startswith("-"):
+    if len(arguments) < 2 or arguments[0] not in EXPECTED:
         raise SystemExit(__doc__)
-    path = Path(arguments[0])
-    frames = read_log(path)
-    # The session asks once for service 32h, which nobody has, to see it refused.
-    names, found = judge(frames, tried=frozenset({0x32}))
+    walk, *logs = arguments
+    frames = [frame for log in logs for frame in read_log(Path(log))]
+    # Both walks ask for service 32h, which nobody has, to see it refused.
+    names, found = judge(frames, EXPECTED[walk], tried=frozenset({0x32}))
     for name, count in sorted(names.items()):
         print(f"  {count:5} {name}")
     if found:
-        raise SystemExit(f"tshark refuses {path}:\n  " + "\n  ".join(found))
+        raise SystemExit(f"tshark refuses {' '.join(logs)}:\n  " + "\n  ".join(found))
     print(f"tshark accepts {len(frames)} frames")
 
 
