@@ -129,6 +129,22 @@ fn set_steps_per_turn() -> Box<Allocated<Moving>> {
     ])
 }
 
+/// With an unacknowledged change of state connection beside the polls, at the moment the shaft is
+/// looked at again.
+fn changing() -> Box<Allocated<Moving>> {
+    let mut allocated = nothing();
+    let set_rate = [0x0A, 0x10, 5, 4, 9, 0, 0];
+    allocated.answer(&Frame::standard(UNCONNECTED_REQUEST, &[0x0A, 0x4B, 3, 1, 0x50, 10]));
+    // The first production comes with the response.
+    allocated
+        .device
+        .handle(allocated.now, Input::Frame(&Frame::standard(EXPLICIT_REQUEST, &set_rate)));
+    assert_eq!(allocated.collect(), 2);
+    allocated.wait(Duration::from_millis(10));
+    allocated.now = allocated.device.deadline().expect("the shaft turns");
+    allocated
+}
+
 /// Each request in, and whatever is owed for it out. Returns the device, so that what it costs to
 /// get rid of it is not counted.
 fn serve<S: Sensor>(mut allocated: Box<Allocated<S>>) -> Box<Allocated<S>> {
@@ -184,6 +200,16 @@ fn explicit_in_fragments(mut allocated: Box<Allocated<Moving>>) -> Box<Allocated
     allocated
 }
 
+// The shaft is looked at, has moved, and the position goes out without being asked for.
+#[library_benchmark]
+#[bench::of_a_moving_sensor(changing())]
+fn change_of_state_out(mut allocated: Box<Allocated<Moving>>) -> Box<Allocated<Moving>> {
+    let Allocated { device, now, .. } = &mut *allocated;
+    device.advance(*now);
+    assert!(black_box(device.transmit(*now)).is_some());
+    allocated
+}
+
 #[library_benchmark]
 #[bench::nothing_due(nothing())]
 fn advance(mut allocated: Box<Allocated<Moving>>) -> Box<Allocated<Moving>> {
@@ -195,7 +221,12 @@ fn advance(mut allocated: Box<Allocated<Moving>>) -> Box<Allocated<Moving>> {
 library_benchmark_group!(
     name = answers;
     benchmarks =
-        poll_in_response_out, poll_with_its_driver, explicit, explicit_in_fragments, advance
+        poll_in_response_out,
+        poll_with_its_driver,
+        change_of_state_out,
+        explicit,
+        explicit_in_fragments,
+        advance
 );
 
 main!(library_benchmark_groups = answers);

@@ -79,6 +79,25 @@ impl Frame {
         frame
     }
 
+    /// A data frame with an 11-bit identifier and the first `length` of `octets`; only the low 11
+    /// bits of `identifier` are taken, and at most eight octets.
+    #[inline]
+    #[must_use]
+    pub const fn of_octets(identifier: u16, octets: [u8; 8], length: usize) -> Self {
+        let length = if length < 8 { length } else { 8 };
+        // Whatever lies behind the length is none of the frame: equal frames are equal.
+        let mask = match length {
+            0 => 0,
+            _ => u64::MAX >> (64 - 8 * length),
+        };
+        Self {
+            identifier: Identifier::Standard(identifier & 0x7FF),
+            remote: false,
+            length: length as u8,
+            data: (u64::from_le_bytes(octets) & mask).to_le_bytes(),
+        }
+    }
+
     fn empty(identifier: Identifier, length: usize) -> Result<Self, Invalid> {
         let fits = match identifier {
             Identifier::Standard(bits) => bits <= 0x7FF,
@@ -247,6 +266,11 @@ mod tests {
 
     #[test]
     fn equal_frames_are_equal_whatever_lies_behind_their_length() {
+        let octets = [1, 2, 3, 4, 5, 6, 7, 8];
+        for length in 0..12 {
+            let frame = Frame::of_octets(0x7C5, octets, length);
+            assert_eq!(frame, Frame::standard(0x7C5, &octets[..length.min(8)]));
+        }
         assert_eq!(
             Frame::standard(1, &[1, 2]),
             Frame::new(Identifier::Standard(1), &[1, 2]).unwrap()

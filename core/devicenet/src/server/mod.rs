@@ -374,13 +374,7 @@ impl Server {
 
     /// Asks `app` for a production and builds the frame, lowest identifier first.
     pub fn transmit<A: Application>(&mut self, now: Instant, app: &mut A) -> Option<Frame> {
-        if !self.network.is_on_line() {
-            let identity = app.identity();
-            return self.network.transmit(identity.vendor, identity.serial);
-        }
-        if self.restart == Restart::Due {
-            return None;
-        }
+        // A node that is not on-line has no connections, so these two are never owed there.
         if let Some(production) = &mut self.production
             && production.io.owed
         {
@@ -395,6 +389,13 @@ impl Server {
         {
             io.owed = false;
             return Some(produce(now, POLL_RESPONSE, self.mac, io.path.assembly, app));
+        }
+        if !self.network.is_on_line() {
+            let identity = app.identity();
+            return self.network.transmit(identity.vendor, identity.serial);
+        }
+        if self.restart == Restart::Due {
+            return None;
         }
         let identifier = group_2(self.mac, EXPLICIT_RESPONSE);
         if let Some(frame) = self.messages.transmit(now, identifier) {
@@ -441,6 +442,7 @@ impl Server {
 }
 
 /// The frame of group 1 that carries `assembly` as of now.
+#[inline]
 fn produce<A: Application>(
     now: Instant,
     message: u8,
@@ -450,7 +452,7 @@ fn produce<A: Application>(
 ) -> Frame {
     let mut octets = [0; 8];
     let size = app.produce(now, assembly, &mut octets);
-    Frame::standard(group_1(message, mac), octets.get(..size).unwrap_or(&octets))
+    Frame::of_octets(group_1(message, mac), octets, size)
 }
 
 /// A refusal without an additional code.
