@@ -13,7 +13,7 @@ export PATH="$PATH:$HOME/.cargo/bin"
 
 CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 export CARGO_TARGET_DIR
-steps=(fmt clippy doc test no-std bench-builds deny strangers)
+steps=(fmt clippy doc test requests no-std bench-builds fuzz-builds deny strangers)
 
 explain() {
     case $1 in
@@ -21,8 +21,10 @@ explain() {
     clippy) echo "clippy has nothing to say" ;;
     doc) echo "the API documentation builds without a warning" ;;
     test) echo "all tests, walls.rs with the import table among them" ;;
+    requests) echo "two million requests from a seed: one answer each, and a refusal changes nothing" ;;
     no-std) echo "core links without allocator and std, on the host and for Cortex-M0 (proofs/no-std)" ;;
     bench-builds) echo "the benchmarks build" ;;
+    fuzz-builds) echo "the fuzz targets build (fuzz/); their corpus runs in test" ;;
     deny) echo "licences, sources and bans of every dependency (cargo deny, deny.toml)" ;;
     strangers) echo "python-can plays the DeviceNet master, tshark judges what it saw (strangers/)" ;;
     esac
@@ -45,12 +47,24 @@ step_test() {
     cargo test --workspace --locked
 }
 
+step_requests() {
+    CODEWHEEL_REQUESTS=2000000 \
+        cargo test --release --locked --package codewheel-device --tests request
+}
+
 step_no-std() {
     proofs/no-std/check.sh
 }
 
 step_bench-builds() {
     cargo bench --workspace --no-run --locked
+}
+
+# Not linked: that needs cargo-fuzz. libFuzzer itself is built, with the C++ compiler.
+step_fuzz-builds() {
+    need c++ g++
+    cargo fmt --manifest-path fuzz/Cargo.toml --check
+    cargo clippy --manifest-path fuzz/Cargo.toml --locked -- -D warnings
 }
 
 step_deny() {
@@ -72,11 +86,44 @@ step_strangers() {
         cp strangers/requirements.txt "$venv/requirements.txt"
     fi
     cargo build --package codewheel --locked
-    "$venv/bin/python" strangers/devicenet_master_test.py
-    "$venv/bin/python" strangers/tshark_judges.py --self-test
-    "$venv/bin/python" strangers/devicenet_session.py "$CARGO_TARGET_DIR/debug/codewheel" \
-        --log "$CARGO_TARGET_DIR/strangers-session.log"
-    "$venv/bin/python" strangers/tshark_judges.py "$CARGO_TARGET_DIR/strangers-session.log"
+    local python="$venv/bin/python" logs="$CARGO_TARGET_DIR/strangers-logs"
+    mkdir -p "$logs"
+    "$python" strangers/devicenet_master_test.py
+    "$python" strangers/tshark_judges.py --self-test
+    # Walks mostly wait for the encoder's clock, so they go side by side.
+    local session="$logs/session" chapters=("$logs/modes" "$logs/resting" "$logs/objects")
+    # Not local, since the trap outlives this function.
+    pids=()
+    trap '[ ${#pids[@]} = 0 ] || kill "${pids[@]}" 2>/dev/null' EXIT
+    walk "$session" devicenet_session.py
+    walk "${chapters[0]}" devicenet_chapters.py --part turning taken rushing singleturn
+    walk "${chapters[1]}" devicenet_chapters.py --part resting
+    walk "${chapters[2]}" devicenet_chapters.py --part objects
+    local at failed=() walks=("$session" "${chapters[@]}")
+    for at in "${!pids[@]}"; do
+        if wait "${pids[at]}"; then
+            cat "${walks[at]}.out"
+        else
+            failed+=("${walks[at]}.out")
+        fi
+    done
+    pids=()
+    # What failed comes last, where people look first.
+    if [ ${#failed[@]} != 0 ]; then
+        cat "${failed[@]}"
+        return 1
+    fi
+    "$python" strangers/tshark_judges.py session "$session.log"
+    "$python" strangers/tshark_judges.py chapters "${chapters[@]/%/.log}"
+}
+
+# Starts the walk $2… of `step_strangers`, which writes $1.log and $1.out.
+walk() {
+    local to=$1 script=$2
+    shift 2
+    "$python" "strangers/$script" "$CARGO_TARGET_DIR/debug/codewheel" --log "$to.log" "$@" \
+        >"$to.out" 2>&1 &
+    pids+=($!)
 }
 
 # Installs Debian packages $2… (or $1) where the command $1 is missing.

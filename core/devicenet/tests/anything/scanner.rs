@@ -205,7 +205,6 @@ impl Bench {
                 let place = usize::from(octet() & 3);
                 let known = self.scanner.slave(mac(MACS[place])).is_some();
                 assert_eq!(self.scanner.add(settings(octet(), place)).is_err(), known);
-                self.scanner.advance(self.now);
             }
             0x9A => {
                 let (place, length) = (usize::from(octet() & 3), octet());
@@ -215,10 +214,8 @@ impl Bench {
                     assert_eq!(view.output, data);
                 }
             }
-            0x9B => {
-                if !self.tickets.is_empty() {
-                    self.scanner.cancel(self.tickets.remove(0));
-                }
+            0x9B if !self.tickets.is_empty() => {
+                self.scanner.cancel(self.tickets.remove(0));
             }
             0x9C => {
                 let probing = if octet() & 1 == 0 { Probing::Gentle } else { Probing::Forced };
@@ -279,6 +276,9 @@ impl Bench {
 
     /// What a driver does after each call.
     fn serve(&mut self) {
+        if self.scanner.deadline().is_some_and(|at| at <= self.now) {
+            self.scanner.advance(self.now);
+        }
         let mut frames = 0;
         while !self.bus_off && self.mailbox.is_none() {
             let (on_line, fault) = (self.scanner.is_on_line(), self.scanner.faulted());
