@@ -2,7 +2,7 @@
 
 use codewheel_station::Writer;
 
-use super::router::{attribute, put};
+use super::router::{attribute, attribute_to_get, only_instance, put};
 use super::{Server, expect_length, refuse};
 use crate::application::{Done, Request};
 use crate::connection::CHANGE_OF_STATE;
@@ -14,14 +14,11 @@ impl Server {
         request: Request<'_>,
         out: &mut Writer<'_>,
     ) -> Result<Done, Error> {
-        if request.instance != 1 {
-            return Err(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST));
-        }
+        only_instance(request)?;
         let handler = &mut self.acknowledge_handler;
         match request.service {
             Service::GET_ATTRIBUTE_SINGLE => {
-                let (path, data) = attribute(request)?;
-                expect_length(data, 0)?;
+                let path = attribute_to_get(request)?;
                 put(match path.attribute {
                     1 => out.u16_le(handler.timer),
                     2 => out.u8(handler.retry_limit),

@@ -3,7 +3,7 @@
 use codewheel_station::{Instant, Reader, Writer};
 
 use super::production::Trigger;
-use super::router::{attribute, put};
+use super::router::{attribute, attribute_to_get, put};
 use super::{REQUEST_OCTETS, RESPONSE_OCTETS, Server, expect_length, refuse};
 use crate::application::{Done, Request};
 use crate::connection::{CHANGE_OF_STATE, Connection, EXPLICIT, POLL, State};
@@ -49,8 +49,7 @@ impl Server {
             self.fixed(instance, app).ok_or(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST))?;
         match request.service {
             Service::GET_ATTRIBUTE_SINGLE => {
-                let (path, data) = attribute(request)?;
-                expect_length(data, 0)?;
+                let path = attribute_to_get(request)?;
                 self.connection_attribute(instance, &fixed, path.attribute, out)
             }
             Service::SET_ATTRIBUTE_SINGLE => {

@@ -4,7 +4,7 @@
 use codewheel_station::can::BitRate;
 use codewheel_station::{Instant, Writer};
 
-use super::router::{attribute, put};
+use super::router::{attribute, attribute_to_get, only_instance, put};
 use super::{Restart, Server, expect_length, refuse};
 use crate::application::{Class, Done, Request, Reset};
 use crate::connection::CHANGE_OF_STATE;
@@ -36,13 +36,10 @@ impl Server {
         out: &mut Writer<'_>,
         app: &mut A,
     ) -> Result<Done, Error> {
-        if request.instance != 1 {
-            return Err(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST));
-        }
+        only_instance(request)?;
         match request.service {
             Service::GET_ATTRIBUTE_SINGLE => {
-                let (path, data) = attribute(request)?;
-                expect_length(data, 0)?;
+                let path = attribute_to_get(request)?;
                 self.identity_attribute(path.attribute, out, app)
             }
             Service::SET_ATTRIBUTE_SINGLE => {
@@ -123,13 +120,10 @@ impl Server {
         out: &mut Writer<'_>,
         app: &mut A,
     ) -> Result<Done, Error> {
-        if request.instance != 1 {
-            return Err(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST));
-        }
+        only_instance(request)?;
         match request.service {
             Service::GET_ATTRIBUTE_SINGLE => {
-                let (path, data) = attribute(request)?;
-                expect_length(data, 0)?;
+                let path = attribute_to_get(request)?;
                 self.devicenet_attribute(path.attribute, out, app)
             }
             Service::SET_ATTRIBUTE_SINGLE => {

@@ -71,8 +71,7 @@ impl Server {
             class::ACKNOWLEDGE_HANDLER => self.acknowledge_handler(request, out),
             _ => match request.service {
                 Service::GET_ATTRIBUTE_SINGLE => {
-                    let (path, data) = attribute(request)?;
-                    expect_length(data, 0)?;
+                    let path = attribute_to_get(request)?;
                     app.get(now, path, out).map(|()| Done::Now)
                 }
                 Service::SET_ATTRIBUTE_SINGLE => {
@@ -95,8 +94,7 @@ impl Server {
     ) -> Result<Done, Error> {
         match request.service {
             Service::GET_ATTRIBUTE_SINGLE => {
-                let (path, data) = attribute(request)?;
-                expect_length(data, 0)?;
+                let path = attribute_to_get(request)?;
                 match path.attribute {
                     1 => put(out.u16_le(about.revision)),
                     2 => put(out.u16_le(about.max_instance)),
@@ -113,13 +111,10 @@ impl Server {
 
 /// The Message Router has one instance and no attributes.
 fn message_router(request: Request<'_>) -> Result<Done, Error> {
-    if request.instance != 1 {
-        return Err(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST));
-    }
+    only_instance(request)?;
     match request.service {
         Service::GET_ATTRIBUTE_SINGLE => {
-            let (_, data) = attribute(request)?;
-            expect_length(data, 0)?;
+            attribute_to_get(request)?;
             Err(refuse(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED))
         }
         _ => Err(refuse(GeneralStatus::SERVICE_NOT_SUPPORTED)),
@@ -137,8 +132,7 @@ fn assembly<A: Application>(
         app.assembly_size(request.instance).ok_or(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST))?;
     match request.service {
         Service::GET_ATTRIBUTE_SINGLE => {
-            let (path, data) = attribute(request)?;
-            expect_length(data, 0)?;
+            let path = attribute_to_get(request)?;
             match path.attribute {
                 3 => {
                     let mut octets = [0; 8];
@@ -162,6 +156,18 @@ pub(super) fn attribute<'a>(request: Request<'a>) -> Result<(Path, &'a [u8]), Er
     let (&attribute, data) =
         request.data.split_first().ok_or(refuse(GeneralStatus::NOT_ENOUGH_DATA))?;
     Ok((Path { class: request.class, instance: request.instance, attribute }, data))
+}
+
+/// The attribute that a Get names; a Get has no data.
+pub(super) fn attribute_to_get(request: Request<'_>) -> Result<Path, Error> {
+    let (path, data) = attribute(request)?;
+    expect_length(data, 0)?;
+    Ok(path)
+}
+
+/// Refuses every instance but 1.
+pub(super) fn only_instance(request: Request<'_>) -> Result<(), Error> {
+    if request.instance == 1 { Ok(()) } else { Err(refuse(GeneralStatus::OBJECT_DOES_NOT_EXIST)) }
 }
 
 /// Ends a Get: done, or the response buffer was too small for the value.
