@@ -192,6 +192,15 @@ impl<S: Sensor> Body<S> {
         flags.min(self.keeping.deadline()).min(self.next_sample).min(self.restart_by)
     }
 
+    /// When a turning shaft was looked at last; `now` for one that rests. Up to a millisecond of not
+    /// looking is no standstill.
+    pub(super) fn looked_at(&self, now: Instant) -> Instant {
+        match self.next_sample.instant() {
+            Some(next) if next <= now + SAMPLE_TIME => next - SAMPLE_TIME,
+            _ => now,
+        }
+    }
+
     /// The flags of assembly 2.
     fn flags(&self) -> u8 {
         let alarm = if self.encoder.alarm() { ALARM_FLAG } else { 0 };

@@ -174,7 +174,7 @@ impl<S: Sensor> DeviceNetEncoder<S> {
             serial: factory.serial,
             position: encoder.position(),
             code: encoder.code(),
-            velocity: encoder.velocity(now),
+            velocity: encoder.velocity(self.body.looked_at(now)),
             in_force: encoder.block(),
             saved: keeping.saved,
             alarm: encoder.alarm(),

@@ -120,6 +120,22 @@ fn what_the_scanner_reads_is_where_the_shaft_stood() {
 }
 
 #[test]
+fn a_snapshot_at_any_moment_shows_the_speed_of_the_shaft() {
+    let mut segment = Segment::new(BitRate::Kbit500, 5..=5, 1);
+    segment.run(Duration::from_secs(1));
+    for _ in 0..20 {
+        segment.run(Duration::from_micros(777));
+        let now = segment.wire.now();
+        let Some(Either::Right(device)) = segment.wire.node(segment.encoders[0]) else {
+            panic!("the encoder is gone");
+        };
+        // −400 rpm; the velocity comes in steps of 10.
+        let off = device.snapshot(now).velocity - -400 * 8_192 / 60;
+        assert!(off.abs() <= 20, "{off} steps/s off at {now}");
+    }
+}
+
+#[test]
 fn with_frames_lost_everywhere_and_nodes_that_lose_power_all_come_back() {
     let mut segment = Segment::new(BitRate::Kbit500, 1..=20, 7);
     segment.run(Duration::from_secs(5));
