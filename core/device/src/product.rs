@@ -208,6 +208,28 @@ mod tests {
         }
     }
 
+    /// AMG manual §1.2, both tables.
+    #[test]
+    fn names_and_files_are_those_the_manual_prints() {
+        let printed = [
+            ("AMG 11 D13", "AMG11D13.eds", "AMG 11 - Singleturn"),
+            ("AMG 11 D29", "AMG11D29.eds", "AMG 11 - Multiturn"),
+            ("AMG 81 D13", "AMG81D13.eds", "AMG 81 - Singleturn"),
+            ("AMG 81 D29", "AMG81D29.eds", "AMG 81 - Multiturn"),
+            ("PMG10…DN.3000", "PMG10D13.eds", "PMG 10 - Singleturn"),
+            ("PMG10…DN.3600", "PMG10D29.eds", "PMG 10 - Multiturn"),
+            ("HMG 11 D13", "HMG11D13.eds", "HMG 11 - Singleturn"),
+            ("HMG 11 D29", "HMG11D29.eds", "HMG 11 - Multiturn"),
+            ("HMG10…DN.3000", "HMG10D13.eds", "HMG 10 - Singleturn"),
+            ("HMG10…DN.3600", "HMG10D29.eds", "HMG 10 - Multiturn"),
+        ];
+        for (product, (title, eds_file, product_name)) in DEVICENET.iter().zip(printed) {
+            assert_eq!(product.title, title);
+            assert_eq!(product.eds_file, eds_file);
+            assert_eq!(product.product_name, product_name);
+        }
+    }
+
     #[test]
     fn names_are_found_in_any_case_and_only_whole() {
         assert_eq!(Product::find("AMG11-D29").map(|product| product.title), Some("AMG 11 D29"));

@@ -82,6 +82,15 @@ mod tests {
         }
     }
 
+    /// AMG manual §9.1: 125 kbit/s and OFF are printed; address 00 is a decision.
+    #[test]
+    fn as_delivered_the_switches_say_address_0_125_kbit_and_no_termination() {
+        let switches = Switches::default();
+        assert_eq!(switches.mac(), MacId::new(0));
+        assert_eq!(switches.bit_rate(), BitRate::Kbit125);
+        assert!(!switches.termination);
+    }
+
     #[test]
     fn the_rotary_switches_read_in_decimal() {
         let switches = Switches { rotary_1: 2, rotary_2: 3, ..Switches::default() };

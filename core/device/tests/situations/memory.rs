@@ -252,3 +252,35 @@ fn a_device_with_a_pending_save_can_still_be_advanced_for_ever() {
     bench.wait(Duration::from_secs(100));
     assert_eq!(bench.device.deadline(), None);
 }
+
+#[test]
+fn the_heartbeat_tells_a_fault_until_it_is_over() {
+    let mut memory = TornMemory::new();
+    memory.write(Slot::A, &[0x55; 92], None);
+    memory.write(Slot::B, &[0xAA; 92], None);
+    let mut bench = Bench::power_up_with("amg11-d29", memory, Hand::default()).allocated();
+    bench.asks("10 01 01 0A 01", "90");
+    let beat = bench.wait(Duration::from_secs(1));
+    assert!(beat[0].starts_with("42B#05CD01000302"), "{beat:?}");
+    bench.asks("16 2F 01", "96");
+    let beat = bench.wait(Duration::from_secs(1));
+    assert!(beat[0].starts_with("42B#05CD01000300"), "{beat:?}");
+}
+
+#[test]
+fn a_save_into_no_memory_succeeds_and_ends_with_the_process() {
+    // Without a memory the host says "kept" at once and keeps nothing.
+    let mut bench = Bench::power_up("amg11-d29").allocated();
+    bench.serves_memory = false;
+    bench.write(7, 1_000);
+    assert_eq!(bench.ask("16 2F 01"), None);
+    assert!(bench.device.keep(bench.now).is_some());
+    bench.device.kept(bench.now, Ok::<(), ()>(()));
+    assert_eq!(bench.collect(), ["42B#0A96"]);
+    bench.write(7, 500);
+    bench.asks("15 2F 01", "95");
+    assert_eq!(bench.read(7), 1_000);
+    bench.serves_memory = true;
+    let mut bench = bench.power_cycled();
+    assert_eq!(bench.read(7), 8_192);
+}

@@ -90,3 +90,12 @@ fn an_acknowledged_cycle_waits_for_each_acknowledge_and_times_out_without() {
     assert_eq!(bench.node.server.connection_state(4), Some(State::TimedOut));
     assert_eq!(bench.wait(Duration::from_secs(5)), [""; 0]);
 }
+
+/// Decision: rate 0 is taken as it is by every other connection, and never elapses.
+#[test]
+fn a_rate_of_zero_produces_once_and_never_by_time() {
+    let mut bench = beating(0);
+    assert_eq!(bench.collect().iter().filter(|frame| frame.starts_with("345#")).count(), 1);
+    assert_eq!(bench.wait(Duration::from_secs(100_000)), [""; 0]);
+    assert_eq!(bench.node.server.connection_state(4), Some(State::Established));
+}
