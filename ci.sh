@@ -13,7 +13,7 @@ export PATH="$PATH:$HOME/.cargo/bin"
 
 CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 export CARGO_TARGET_DIR
-steps=(fmt clippy doc test requests no-std bench-builds fuzz-builds deny strangers)
+steps=(fmt clippy doc test requests segments no-std bench-builds fuzz-builds deny strangers)
 
 explain() {
     case $1 in
@@ -22,6 +22,7 @@ explain() {
     doc) echo "the API documentation builds without a warning" ;;
     test) echo "all tests, walls.rs with the import table among them" ;;
     requests) echo "two million requests from a seed: one answer each, and a refusal changes nothing" ;;
+    segments) echo "63 encoders and a scanner with losses and power cuts, 20 seeds" ;;
     no-std) echo "core links without allocator and std, on the host and for Cortex-M0 (proofs/no-std)" ;;
     bench-builds) echo "the benchmarks build" ;;
     fuzz-builds) echo "the fuzz targets build (fuzz/); their corpus runs in test" ;;
@@ -50,6 +51,11 @@ step_test() {
 step_requests() {
     CODEWHEEL_REQUESTS=2000000 \
         cargo test --release --locked --package codewheel-device --tests request
+}
+
+step_segments() {
+    CODEWHEEL_NODES=63 \
+        cargo test --release --locked --package codewheel-device --test segments lost_frames
 }
 
 step_no-std() {

@@ -115,6 +115,12 @@ impl Connection {
         }
     }
 
+    /// From now on the connection lasts ten seconds at most without reception, also with expected
+    /// packet rate 0.
+    pub(crate) fn limit(&mut self, now: Instant) {
+        self.inactive_at = self.inactive_at.min(Deadline::at(now + PRE_CONSUMPTION_TIME));
+    }
+
     /// Stops the inactivity timer.
     pub const fn disarm(&mut self) {
         self.inactive_at = Deadline::NEVER;

@@ -3,8 +3,12 @@
 //!
 //! ```sh
 //! CODEWHEEL_SEEDS=2000 cargo test --release -p codewheel-device --test segments lost_frames
+//! CODEWHEEL_NODES=63 cargo test --release -p codewheel-device --test segments lost_frames
 //! CODEWHEEL_SEED=17 cargo test -p codewheel-device --test segments lost_frames
 //! ```
+//!
+//! Without `CODEWHEEL_NODES` a seed has 6 to 12 encoders, so that a debug build has them all within
+//! seconds.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
@@ -167,9 +171,11 @@ impl Drop for Seed {
     fn drop(&mut self) {
         if thread::panicking() {
             eprintln!(
-                "seed {0} failed; again: CODEWHEEL_SEED={0} cargo test -p codewheel-device --test \
-                 segments lost_frames",
-                self.0
+                "seed {0} failed; again: CODEWHEEL_SEED={0} {nodes}cargo test -p codewheel-device \
+                 --test segments lost_frames",
+                self.0,
+                nodes = number("CODEWHEEL_NODES")
+                    .map_or(String::new(), |nodes| format!("CODEWHEEL_NODES={nodes} ")),
             );
         }
     }
@@ -186,6 +192,7 @@ fn with_lost_frames_and_power_cuts_all_come_back_and_agree_on_who_owns_whom() {
         Some(seed) => seed..seed + 1,
         None => 0..number("CODEWHEEL_SEEDS").unwrap_or(20),
     };
+    let nodes = number("CODEWHEEL_NODES").map(|nodes| nodes.clamp(1, 63) as u8);
     let next = AtomicU64::new(seeds.start);
     let work = || {
         let mut longest = (Duration::ZERO, 0);
@@ -195,7 +202,8 @@ fn with_lost_frames_and_power_cuts_all_come_back_and_agree_on_who_owns_whom() {
                 return longest;
             }
             let named = Seed(seed);
-            longest = longest.max((trouble(6 + (seed % 7) as u8, 8, seed), seed));
+            let nodes = nodes.unwrap_or(6 + (seed % 7) as u8);
+            longest = longest.max((trouble(nodes, 8, seed), seed));
             drop(named);
         }
     };

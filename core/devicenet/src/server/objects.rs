@@ -71,6 +71,9 @@ impl Server {
                     _ => return Err(refuse(GeneralStatus::TOO_MUCH_DATA)),
                 };
                 let done = app.reset(now, reset)?;
+                if let Some(explicit) = &mut self.explicit {
+                    explicit.limit(now);
+                }
                 self.restart = match done {
                     Done::Now => Restart::Answering,
                     Done::Later => Restart::Writing,

@@ -52,7 +52,9 @@ impl Server {
     }
 
     pub(super) fn explicit_timed_out<A: Application>(&mut self, now: Instant, app: &mut A) {
-        let lives_on = self.io_is(State::Established);
+        // A device that is about to restart has nothing to defer: an answer whose way to the wire
+        // is never reported must not hold the restart up for ever.
+        let lives_on = self.io_is(State::Established) && self.restart == Restart::No;
         let Some(connection) = &mut self.explicit else { return };
         app.notice(now, Event::TimedOut { instance: EXPLICIT });
         if connection.watchdog_action == Connection::DEFERRED_DELETE && lives_on {

@@ -49,6 +49,23 @@ fn with_nobody_left_to_hear_the_answer_an_accepted_reset_is_carried_out() {
 }
 
 #[test]
+fn an_answer_never_reported_as_sent_holds_the_restart_up_for_ten_seconds_at_most() {
+    // Deferred delete beside a connection that never times out; then without any time-out at all.
+    for prepare in [["10 05 01 0C 03", "10 05 02 09 00 00"], ["10 05 01 09 00 00", "0E 01 01 01"]] {
+        let mut bench = Bench::allocated();
+        for request in prepare {
+            assert!(bench.ask(request).is_some());
+        }
+        bench.hears("42C#0A050101");
+        bench.hands_out().expect("the answer");
+        bench.wait(Duration::from_nanos(9_999_999_999));
+        assert!(!bench.node.server.power_cycle_due());
+        bench.wait(Duration::from_nanos(1));
+        assert!(bench.node.server.power_cycle_due(), "{prepare:?}");
+    }
+}
+
+#[test]
 fn the_answer_to_another_service_05_does_not_count_as_that_of_the_reset() {
     let mut bench = Bench::polled();
     bench.hears("42C#0A050501");
