@@ -9,6 +9,8 @@
 
 use core::fmt;
 
+use codewheel_station::can::Frame;
+
 use crate::MacId;
 
 /// The first octet of every explicit message, as on the wire; every value is a header.
@@ -214,6 +216,15 @@ impl fmt::Display for Path {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:02x}/{}/{}", self.class, self.instance, self.attribute)
     }
+}
+
+/// A frame of a head and what follows it, eight octets together at most.
+pub(crate) fn frame(identifier: u16, head: &[u8], rest: &[u8]) -> Frame {
+    let mut octets = [0; 8];
+    for (to, from) in octets.iter_mut().zip(head.iter().chain(rest)) {
+        *to = *from;
+    }
+    Frame::of_octets(identifier, octets, head.len() + rest.len())
 }
 
 #[cfg(test)]

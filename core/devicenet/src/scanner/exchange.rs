@@ -14,7 +14,7 @@ use codewheel_station::can::Frame;
 use codewheel_station::{Deadline, Duration, Instant};
 
 use crate::MacId;
-use crate::explicit::{Error, GeneralStatus, Header, Service};
+use crate::explicit::{Error, GeneralStatus, Header, Service, frame};
 use crate::fragment::{
     FIRST_AND_ONLY, Fragment, Kind, Piece, Reassembly, Received, STATUS_OK, STATUS_TOO_MUCH_DATA,
     Sending,
@@ -386,14 +386,4 @@ const fn is_last(fragment: Fragment) -> bool {
         Kind::First => fragment.count == FIRST_AND_ONLY,
         Kind::Middle | Kind::Acknowledge => false,
     }
-}
-
-/// A frame of a head and what follows it.
-pub(super) fn frame(identifier: u16, head: &[u8], rest: &[u8]) -> Frame {
-    let mut octets = [0; 8];
-    let length = head.len() + rest.len();
-    for (to, from) in octets.iter_mut().zip(head.iter().chain(rest)) {
-        *to = *from;
-    }
-    Frame::standard(identifier, octets.get(..length).unwrap_or(&octets))
 }

@@ -3,8 +3,8 @@
 use codewheel_station::Instant;
 use codewheel_station::can::Frame;
 
-use super::exchange::frame;
 use crate::MacId;
+use crate::explicit::frame;
 use crate::fragment::{Fragment, Reassembly, Received, io_fragment};
 use crate::identifier::{POLL_COMMAND, group_2};
 

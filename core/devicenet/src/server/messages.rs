@@ -4,7 +4,7 @@ use codewheel_station::can::Frame;
 use codewheel_station::{Deadline, Instant};
 
 use super::{REQUEST_OCTETS, RESPONSE_OCTETS};
-use crate::explicit::{Error, Header, Service};
+use crate::explicit::{Error, Header, Service, frame};
 use crate::fragment::{
     FIRST_AND_ONLY, Fragment, Kind, Piece, Reassembly, Received, STATUS_OK, STATUS_TOO_MUCH_DATA,
     Sending,
@@ -262,14 +262,4 @@ impl Messages {
             }
         })
     }
-}
-
-/// A frame of a head and what follows it, eight octets together at most.
-fn frame(identifier: u16, head: &[u8], rest: &[u8]) -> Frame {
-    let mut octets = [0; 8];
-    for (to, from) in octets.iter_mut().zip(head.iter().chain(rest)) {
-        *to = *from;
-    }
-    let length = head.len() + rest.len();
-    Frame::standard(identifier, octets.get(..length).unwrap_or(&octets))
 }
