@@ -1,4 +1,5 @@
-//! The ground floor of codewheel: time, byte cursors, CAN frames and the [`Station`] trait.
+//! The ground floor of codewheel: time, byte cursors, CAN frames, RS-485 telegrams and the
+//! [`Station`] trait.
 //!
 //! Everything above speaks through these few types: a protocol stack is a [`Station`], a wire or a
 //! port moves its frames, a loop watches its deadlines. Nothing here reads a clock, allocates or
@@ -17,6 +18,7 @@ extern crate std;
 
 pub mod can;
 mod cursor;
+pub mod rs485;
 mod time;
 
 pub use cursor::{Full, Reader, Short, Writer};
@@ -36,9 +38,9 @@ pub use time::{Deadline, Duration, Instant, earlier};
 /// In return the station never blocks, never fails, never panics, and owes its answers as flags
 /// rather than queueing them: an answer fetched late is built once, from today's values.
 pub trait Station {
-    /// What the medium brings. CAN: [`can::Input`]. RS-485: octets or a broken character.
+    /// What the medium brings. CAN: [`can::Input`]. RS-485: [`rs485::Input`].
     type Input<'a>;
-    /// What the medium takes: a CAN frame or a telegram.
+    /// What the medium takes: a [`can::Frame`] or an [`rs485::Transmission`].
     type Output;
 
     /// Takes in what arrived at `now`. Nothing a peer can send makes this fail or panic.
