@@ -59,6 +59,7 @@ const TWO_BOOKS: &str = "two books; what they share is the station";
 const ANY_DEVICE: &str = "a protocol book serves any device";
 const LABORATORY: &str = "the product does not know the laboratory";
 const VIRTUAL_TIME: &str = "the laboratory runs in virtual time or not at all";
+const SENSOR_LINE: &str = "a sensor line does not know which bus its code goes to";
 const SNAPSHOTS: &str = "the page sees snapshots, events and commands, no protocol";
 const FIRMWARE: &str = "firmware, fuzzer and simulator run the same bytes of core";
 const GROUND: &str = "the ground floor carries the others";
@@ -117,6 +118,15 @@ const ROOMS: &[Room] = &[
         ],
     },
     Room { name: "codewheel-link", floor: Floor::Host, walls: &[] },
+    Room {
+        name: "codewheel-spidev",
+        floor: Floor::Host,
+        walls: &[
+            never("codewheel-devicenet", SENSOR_LINE),
+            never("codewheel-profibus", SENSOR_LINE),
+            never("codewheel-device", SENSOR_LINE),
+        ],
+    },
     Room { name: "codewheel-datasheet", floor: Floor::Host, walls: &[] },
     Room { name: "codewheel-commission", floor: Floor::Host, walls: &[] },
     Room { name: "codewheel-plant", floor: Floor::Host, walls: &[] },

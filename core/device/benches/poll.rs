@@ -30,7 +30,7 @@ struct Moving {
 impl Sensor for Moving {
     fn sample(&mut self, _: Instant) -> Sample {
         self.code += 100;
-        Sample { code: self.code, cell_low: false }
+        Sample { code: self.code, ..Sample::default() }
     }
 
     fn changes_at(&self, now: Instant) -> Option<Instant> {

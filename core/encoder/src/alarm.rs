@@ -1,4 +1,4 @@
-//! The position error: a code that moved further than any shaft turns.
+//! The position error: a code that moved further than any shaft turns, or that could not be read.
 
 use codewheel_station::{Deadline, Duration, Instant};
 
@@ -48,9 +48,14 @@ impl PositionError {
         // moved > ⌊limit·elapsed / 1 min⌋ without the division; the left side stays below 2⁶⁴.
         let took = u64::from(moved).saturating_mul(MINUTE.as_nanos());
         if took > self.limit.saturating_mul(elapsed.as_nanos()) {
-            // Decision: "extended by 2.5 s" means that every event starts the time anew.
-            self.until = Deadline::at(now + ALARM_TIME);
+            self.raise(now);
         }
+    }
+
+    /// Begins the alarm, or begins its time anew.
+    pub(crate) fn raise(&mut self, now: Instant) {
+        // Decision: "extended by 2.5 s" means that every event starts the time anew.
+        self.until = Deadline::at(now + ALARM_TIME);
     }
 
     /// Ends the alarm once its time is over.

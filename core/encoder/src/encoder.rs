@@ -3,9 +3,10 @@
 use codewheel_station::Instant;
 
 use crate::alarm::{DEFAULT_SPEED_LIMIT, PositionError};
+use crate::ssi::LineFault;
 use crate::transform::Transform;
 use crate::velocity::Velocity;
-use crate::{Block, Direction, Model, Reference, Refusal, Sample, Settings};
+use crate::{Block, Direction, Model, Reading, Reference, Refusal, Sample, Settings};
 
 /// An absolute rotary encoder: one settings block in force, one shaft, no bus.
 ///
@@ -26,6 +27,8 @@ pub struct Encoder {
     /// When the newest sample was taken.
     sampled_at: Instant,
     cell_low: bool,
+    /// What was wrong with the newest reading.
+    line_fault: Option<LineFault>,
     /// The settings changed before the first sample, which may still move k.
     change_awaits_sample: bool,
     position_error: PositionError,
@@ -88,6 +91,7 @@ impl Encoder {
             known,
             sampled_at: Instant::ZERO,
             cell_low: false,
+            line_fault: None,
             change_awaits_sample: false,
             position_error: PositionError::new(DEFAULT_SPEED_LIMIT, singleturn_resolution),
             velocity: Velocity::new(),
@@ -100,9 +104,24 @@ impl Encoder {
     /// Two samples less than 2.5 ms apart that differ by more than the shaft can turn raise the
     /// position error; the position follows the newer one all the same. The first sample after
     /// power-up raises none.
+    ///
+    /// Where the reading failed, the last good position is held, none as long as there was no good
+    /// one, and every failed reading renews the position error. A repeated reading changes nothing;
+    /// the encoder goes on once there is a new one.
+    // Inlined, so that a sensor that always measures pays nothing for those that may fail.
+    #[inline]
     pub fn sample(&mut self, now: Instant, sample: Sample) {
+        match sample.reading {
+            Reading::Fresh => self.measure(now, sample.code, sample.cell_low),
+            Reading::Repeated => self.advance(now),
+            Reading::Failed(fault) => self.fail(now, fault),
+        }
+    }
+
+    /// A sample with a code, in parts that fit registers.
+    fn measure(&mut self, now: Instant, code: u32, cell_low: bool) {
         // N is a power of two.
-        let code = sample.code & (self.model.geometry.range() - 1);
+        let code = code & (self.model.geometry.range() - 1);
         self.position_error.advance(now);
         match self.known {
             Known::Sample => {
@@ -126,7 +145,15 @@ impl Encoder {
         self.known = Known::Sample;
         self.code = code;
         self.sampled_at = now;
-        self.cell_low = sample.cell_low;
+        self.cell_low = cell_low;
+        self.line_fault = None;
+    }
+
+    /// A sample without a code, from a line that does not answer.
+    #[cold]
+    fn fail(&mut self, now: Instant, fault: LineFault) {
+        self.line_fault = Some(fault);
+        self.position_error.raise(now);
     }
 
     /// Whether the shaft has been sampled since power-up. Until then position and code mean
@@ -173,6 +200,13 @@ impl Encoder {
     #[must_use]
     pub const fn warning(&self) -> bool {
         self.cell_low && self.model.lithium_cell
+    }
+
+    /// What was wrong with the newest reading of the SSI line; `None` from the first good one on,
+    /// while the position error it raised goes on to its end. Always `None` without such a line.
+    #[must_use]
+    pub const fn line_fault(&self) -> Option<LineFault> {
+        self.line_fault
     }
 
     /// Lets the position error end when its 2.5 s are over. Calling it early or twice does

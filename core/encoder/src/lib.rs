@@ -4,7 +4,8 @@
 //! power cut. It knows no bus: who asks for the position is the business of the floors above.
 //!
 //! The way of a value: a [`Sensor`] yields a [`Sample`], [`Encoder::sample`] follows the shaft
-//! with it, [`Encoder::position`] says where it stands. The way of a setting: a write builds a new
+//! with it, [`Encoder::position`] says where it stands. A converter has an SSI line for a sensor, see
+//! [`ssi`]. The way of a setting: a write builds a new
 //! [`Settings`], [`Encoder::apply`] takes it whole or refuses it with a [`Refusal`]. The way over a
 //! power cut: [`encode`] turns a [`Kept`] into octets, [`choose`] finds the newer whole record of
 //! two slots.
@@ -29,6 +30,7 @@ mod refusal;
 mod sensor;
 mod settings;
 mod slots;
+pub mod ssi;
 mod transform;
 mod velocity;
 
@@ -38,6 +40,6 @@ pub use encoder::Encoder;
 pub use geometry::{Geometry, Model};
 pub use record::{Damage, Kept, RECORD_OCTETS, decode, encode};
 pub use refusal::Refusal;
-pub use sensor::{Sample, Sensor};
+pub use sensor::{Reading, Sample, Sensor};
 pub use settings::{Direction, Settings};
 pub use slots::{Slot, Start, choose};

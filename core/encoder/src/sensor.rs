@@ -2,6 +2,8 @@
 
 use codewheel_station::Instant;
 
+use crate::ssi::LineFault;
+
 /// What the sensor says at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
@@ -9,6 +11,22 @@ pub struct Sample {
     pub code: u32,
     /// Whether the voltage of the lithium cell is too low. Means nothing to products without one.
     pub cell_low: bool,
+    /// What stands behind the code.
+    pub reading: Reading,
+}
+
+/// What stands behind the code of a [`Sample`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Reading {
+    /// It was measured for this sample.
+    #[default]
+    Fresh,
+    /// It was measured for an earlier sample, and nothing has been measured since: what a line that
+    /// is read in a cycle says in between. Not to be judged by: the next code would seem to have
+    /// moved in no time.
+    Repeated,
+    /// It could not be measured now; the code means nothing.
+    Failed(LineFault),
 }
 
 /// The source of raw codes. The encoder asks it at the moment it needs a position.

@@ -101,8 +101,9 @@ impl Shaft {
 }
 
 impl Sensor for Shaft {
+    #[inline]
     fn sample(&mut self, now: Instant) -> Sample {
-        Sample { code: self.code(now), cell_low: false }
+        Sample { code: self.code(now), ..Sample::default() }
     }
 
     fn changes_at(&self, now: Instant) -> Option<Instant> {

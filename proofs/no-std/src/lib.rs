@@ -132,7 +132,7 @@ struct Still {
 
 impl Sensor for Still {
     fn sample(&mut self, _: Instant) -> Sample {
-        Sample { code: self.code, cell_low: false }
+        Sample { code: self.code, ..Sample::default() }
     }
 
     fn changes_at(&self, _: Instant) -> Option<Instant> {

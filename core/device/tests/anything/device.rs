@@ -48,7 +48,7 @@ struct Hand {
 
 impl Sensor for Hand {
     fn sample(&mut self, _: Instant) -> Sample {
-        Sample { code: self.code, cell_low: self.cell_low }
+        Sample { code: self.code, cell_low: self.cell_low, ..Sample::default() }
     }
     fn changes_at(&self, now: Instant) -> Option<Instant> {
         self.turns.then_some(now)

@@ -24,7 +24,7 @@ struct Still;
 
 impl Sensor for Still {
     fn sample(&mut self, _: Instant) -> Sample {
-        Sample { code: 4_711, cell_low: false }
+        Sample { code: 4_711, ..Sample::default() }
     }
     fn changes_at(&self, _: Instant) -> Option<Instant> {
         None

@@ -22,7 +22,7 @@ struct Turning(u32);
 impl Sensor for Turning {
     fn sample(&mut self, _: Instant) -> Sample {
         self.0 += 1;
-        Sample { code: self.0 & 0x1FFF, cell_low: false }
+        Sample { code: self.0 & 0x1FFF, ..Sample::default() }
     }
     fn changes_at(&self, _: Instant) -> Option<Instant> {
         None

@@ -19,7 +19,7 @@ pub(crate) struct Hand {
 impl Sensor for Hand {
     fn sample(&mut self, _: Instant) -> Sample {
         self.looks += 1;
-        Sample { code: self.code, cell_low: self.cell_low }
+        Sample { code: self.code, cell_low: self.cell_low, ..Sample::default() }
     }
     fn changes_at(&self, now: Instant) -> Option<Instant> {
         self.turning.then_some(now)

@@ -111,7 +111,7 @@ pub fn at_millis(millis: u64) -> Instant {
 }
 
 pub fn code(code: u32) -> Sample {
-    Sample { code, cell_low: false }
+    Sample { code, ..Sample::default() }
 }
 
 /// An encoder with `settings` in force and nothing known of the shaft.

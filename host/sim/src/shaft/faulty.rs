@@ -79,7 +79,7 @@ impl<S: Sensor> Sensor for Faulty<S> {
             }
         };
         self.last_code = Some(code);
-        Sample { code, cell_low: sample.cell_low || self.cell_low }
+        Sample { code, cell_low: sample.cell_low || self.cell_low, ..sample }
     }
 
     fn changes_at(&self, now: Instant) -> Option<Instant> {
