@@ -8,25 +8,21 @@
 
 mod bits;
 mod candump;
-mod either;
 mod errors;
 mod event;
 mod faults;
 pub mod rules;
-mod schedule;
 mod script;
 mod statistics;
 mod takers;
-mod troubled;
 mod wire;
 
+pub use crate::{Drops, Either, Troubled};
 pub use bits::frame_bits;
 pub use candump::{FrameTextError, candump_line, parse_frame};
-pub use either::Either;
 pub use event::Event;
 pub use faults::Faults;
 pub use rules::Rule;
 pub use script::Script;
 pub use statistics::Statistics;
-pub use troubled::{Drops, Troubled};
 pub use wire::{Node, NodeId, Wire};

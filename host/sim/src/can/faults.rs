@@ -1,7 +1,5 @@
 //! Faults drawn from a seed.
 
-use fastrand::Rng;
-
 /// How often the wire fails. Probabilities from 0 (never, the default) to 1 (always); what lies
 /// outside counts as the nearer end, what is no number as 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,10 +11,4 @@ pub struct Faults {
     /// noise makes nobody bus-off, however strong it is; a bad transceiver does,
     /// [`Wire::set_corruption_at`](super::Wire::set_corruption_at).
     pub corruption: f64,
-}
-
-/// Whether something with this probability happens. Certain outcomes draw nothing, so a wire
-/// without faults runs the same whatever its seed.
-pub(super) fn happens(random: &mut Rng, probability: f64) -> bool {
-    probability >= 1.0 || probability > 0.0 && random.f64() < probability
 }

@@ -11,9 +11,9 @@ use fastrand::Rng;
 
 use super::bits::Sequence;
 use super::errors::TransmitErrors;
-use super::schedule::{NEVER, Schedule};
 use super::takers::Takers;
 use super::{Event, Faults, Rule, Statistics};
+use crate::schedule::{NEVER, Schedule};
 use bus_off::Off;
 
 /// A [`Station`] that speaks CAN. Every such station is one.

@@ -6,7 +6,7 @@ use codewheel_station::can::Input;
 use super::{Node, Phase, Wire};
 use crate::can::Event;
 use crate::can::errors::TransmitErrors;
-use crate::can::schedule::NEVER;
+use crate::schedule::NEVER;
 
 /// How often a controller has to see eleven recessive bits before it takes part again.
 const SEQUENCES: u64 = 128;

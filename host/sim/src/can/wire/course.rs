@@ -5,8 +5,9 @@ use codewheel_station::{Duration, Instant};
 
 use super::{Attached, Mail, Node, NodeId, Outcome, Phase, Waiting, Wire};
 use crate::can::bits::{INTERFRAME_SPACE, Sequence, arbitration_key};
-use crate::can::schedule::NEVER;
-use crate::can::{Event, faults, rules};
+use crate::can::{Event, rules};
+use crate::chance::happens;
+use crate::schedule::NEVER;
 
 /// How often a station may be called within one bit before it counts as stuck.
 const TURNS: u32 = 1_000;
@@ -124,7 +125,7 @@ impl<N: Node> Wire<N> {
 
     fn corrupts(&mut self, slot: usize) -> bool {
         let own = self.slots[slot].node.as_ref().and_then(|node| node.corruption);
-        faults::happens(&mut self.random, own.unwrap_or(self.faults.corruption))
+        happens(&mut self.random, own.unwrap_or(self.faults.corruption))
     }
 
     /// Several stations send one identifier at the same moment. Where they send the same bits
@@ -268,7 +269,7 @@ impl<N: Node> Wire<N> {
             return;
         }
         let loss = node.loss.unwrap_or(self.faults.loss);
-        if faults::happens(&mut self.random, loss) {
+        if happens(&mut self.random, loss) {
             self.counted.lost += 1;
             let (at, receiver) = (Instant::from_nanos(self.now), self.id(slot));
             return observer(&Event::Lost { at, receiver, frame: *frame });

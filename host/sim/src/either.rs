@@ -1,12 +1,10 @@
 //! Two kinds of stations on one wire.
 
-use codewheel_station::can::{Frame, Input};
+use codewheel_station::rs485::{BaudRate, Node};
 use codewheel_station::{Instant, Station};
 
-use super::Node;
-
-/// A station of one of two kinds, so that a device and a hand-played
-/// [`Script`](super::Script) can share a wire. More kinds nest.
+/// A station of one of two kinds for the same medium, so that a device and a hand-played
+/// [`Script`](crate::can::Script) can share a wire. More kinds nest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Either<L, R> {
     /// The first kind.
@@ -49,11 +47,15 @@ impl<L, R> Either<L, R> {
     }
 }
 
-impl<L: Node, R: Node> Station for Either<L, R> {
-    type Input<'a> = Input<'a>;
-    type Output = Frame;
+impl<L, R> Station for Either<L, R>
+where
+    L: Station,
+    R: for<'a> Station<Input<'a> = L::Input<'a>, Output = L::Output>,
+{
+    type Input<'a> = L::Input<'a>;
+    type Output = L::Output;
 
-    fn handle(&mut self, now: Instant, input: Input<'_>) {
+    fn handle(&mut self, now: Instant, input: Self::Input<'_>) {
         match self {
             Self::Left(station) => station.handle(now, input),
             Self::Right(station) => station.handle(now, input),
@@ -67,7 +69,7 @@ impl<L: Node, R: Node> Station for Either<L, R> {
         }
     }
 
-    fn transmit(&mut self, now: Instant) -> Option<Frame> {
+    fn transmit(&mut self, now: Instant) -> Option<Self::Output> {
         match self {
             Self::Left(station) => station.transmit(now),
             Self::Right(station) => station.transmit(now),
@@ -78,6 +80,15 @@ impl<L: Node, R: Node> Station for Either<L, R> {
         match self {
             Self::Left(station) => station.deadline(),
             Self::Right(station) => station.deadline(),
+        }
+    }
+}
+
+impl<L: Node, R: Node> Node for Either<L, R> {
+    fn baud_rate(&self) -> BaudRate {
+        match self {
+            Self::Left(station) => station.baud_rate(),
+            Self::Right(station) => station.baud_rate(),
         }
     }
 }

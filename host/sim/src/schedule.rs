@@ -2,16 +2,16 @@
 
 /// A tournament of deadlines: the least is read in one step and one is changed in log₂ n steps.
 #[derive(Clone, Debug)]
-pub(super) struct Schedule {
+pub(crate) struct Schedule {
     /// The root at 1, the children of `i` at `2i` and `2i + 1`, the slots in the second half.
     tree: Vec<u64>,
 }
 
 /// The deadline of a slot that waits for nothing but input.
-pub(super) const NEVER: u64 = u64::MAX;
+pub(crate) const NEVER: u64 = u64::MAX;
 
 impl Schedule {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { tree: vec![NEVER; 2] }
     }
 
@@ -20,7 +20,7 @@ impl Schedule {
     }
 
     /// Sets the deadline of `slot`, which may be new.
-    pub(super) fn set(&mut self, slot: usize, deadline: u64) {
+    pub(crate) fn set(&mut self, slot: usize, deadline: u64) {
         if slot >= self.leaves() {
             self.grow(slot + 1);
         }
@@ -37,12 +37,12 @@ impl Schedule {
     }
 
     /// The least deadline, [`NEVER`] where there is none.
-    pub(super) fn earliest(&self) -> u64 {
+    pub(crate) fn earliest(&self) -> u64 {
         self.tree[1]
     }
 
     /// The slot whose deadline is not after `now`: the least deadline first, then the lowest slot.
-    pub(super) fn due(&self, now: u64) -> Option<usize> {
+    pub(crate) fn due(&self, now: u64) -> Option<usize> {
         let earliest = self.earliest();
         if earliest > now || earliest == NEVER {
             return None;
