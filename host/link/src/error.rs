@@ -2,9 +2,12 @@
 
 use std::io;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 
 use codewheel_station::can::BitRate;
 use thiserror::Error;
+
+use crate::{BusUri, Medium};
 
 /// Why a port cannot be opened or is lost: what was tried, what came back, what to do.
 #[derive(Debug, Error)]
@@ -67,6 +70,50 @@ pub enum LinkError {
         /// The rate of those who joined before.
         actual: BitRate,
     },
+    /// The URI names a bus of another kind than is asked for, or one that no port leads to.
+    #[error("{uri} is no {wanted} bus to connect to: write {}", .wanted.forms())]
+    OtherMedium {
+        /// The bus as given.
+        uri: BusUri,
+        /// What the port was to carry.
+        wanted: Medium,
+    },
+    /// A serial port, or a pty, cannot be opened or set up.
+    #[error("cannot open the serial port {}: {}{}", .path.display(), phrase(.reason),
+        device_advice(.reason))]
+    Device {
+        /// Its path as given.
+        path: PathBuf,
+        /// What the system said.
+        reason: io::Error,
+    },
+    /// The name of a pty cannot be put where it is wanted.
+    #[error("cannot put a serial port at {}: {reason}; remove what is there, or choose another path",
+        .path.display())]
+    Name {
+        /// The path as given.
+        path: PathBuf,
+        /// What is in the way.
+        reason: String,
+    },
+    /// The RS-485 line is gone.
+    #[error("the line {line} was lost: {reason}; {advice}")]
+    LineLost {
+        /// The line as a bus URI.
+        line: String,
+        /// What the system said, or that the other side closed it.
+        reason: String,
+        /// What to do.
+        advice: &'static str,
+    },
+    /// This operating system has no such port.
+    #[error(
+        "{uri} needs a Unix system; write rs485-listen:HOST:PORT or rs485:HOST:PORT for RS-485 here"
+    )]
+    NotHere {
+        /// The bus as given.
+        uri: BusUri,
+    },
     /// The operating system cannot watch sockets.
     #[error(
         "the operating system cannot watch the sockets of the bus: {0}; close other \
@@ -93,6 +140,17 @@ fn listen_advice(reason: &io::Error) -> &'static str {
         io::ErrorKind::AddrNotAvailable => "; give an address that this machine has",
         io::ErrorKind::PermissionDenied => "; choose a port from 1024 on",
         _ => "; choose another address or port",
+    }
+}
+
+fn device_advice(reason: &io::Error) -> &'static str {
+    match reason.kind() {
+        io::ErrorKind::NotFound => "; plug the adapter in and look in /dev for its name",
+        io::ErrorKind::PermissionDenied => {
+            "; you need the right to use it, on most systems by joining the group dialout"
+        }
+        io::ErrorKind::ResourceBusy => "; another program uses it alone: stop that one first",
+        _ => "; check that the path is that of a serial port",
     }
 }
 

@@ -1,7 +1,8 @@
-//! Real ports for a CAN station, and the one loop that drives a station on them.
+//! Real ports for CAN and RS-485 stations, and the loops that drive a station on them.
 //!
 //! A [`BusUri`] names a bus, [`open`] joins it and gives a [`CanPort`], and [`Loop::turn`] moves
-//! frames and time between the port and a [`Station`](codewheel_station::Station):
+//! frames and time between the port and a [`Station`](codewheel_station::Station). For RS-485 these
+//! are [`open_rs485`], [`Rs485Port`] and [`Rs485Loop::turn`]:
 //!
 //! ```no_run
 //! # use codewheel_link::{Clock, Loop, LinkError, open};
@@ -26,10 +27,14 @@
 //! Nothing a peer sends makes a port fail, panic, grow without bound or serve another peer late.
 //! Nothing here prints: what people should hear comes out as a [`Notice`].
 
+mod clients;
 mod error;
 mod notice;
+mod output;
 mod port;
+pub mod rs485;
 pub mod slcan;
+mod socket;
 mod turn;
 mod uri;
 mod virtual_bus;
@@ -37,5 +42,6 @@ mod virtual_bus;
 pub use error::LinkError;
 pub use notice::Notice;
 pub use port::{CanPort, Received, Waker, open};
+pub use rs485::{Rs485Loop, Rs485Port, Rs485Received, open_rs485};
 pub use turn::{Clock, Loop, Outcome, STAND_IN};
-pub use uri::{BusUri, Endpoint, InvalidBusUri};
+pub use uri::{BusUri, Endpoint, InvalidBusUri, Medium};

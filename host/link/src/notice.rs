@@ -4,13 +4,15 @@ use std::fmt;
 use std::net::SocketAddr;
 
 use codewheel_station::can::{BitRate, Frame};
+use codewheel_station::rs485::BaudRate;
 
 /// Something on a port that people may want to hear of; its text is one sentence without a full
 /// stop. No notice stops the port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Notice {
-    /// A client connected to our SLCAN server; its channel is still closed.
+    /// A client connected to us. With SLCAN its channel is still closed; on an RS-485 line it hears
+    /// and is heard from now on.
     ClientConnected {
         /// Where the client is.
         client: SocketAddr,
@@ -39,6 +41,13 @@ pub enum Notice {
         /// How many frames it did not fetch in time and lost.
         frames_lost: u64,
     },
+    /// A client of an RS-485 line is gone that did not fetch everything in time.
+    ClientLeftShort {
+        /// Where it was.
+        client: SocketAddr,
+        /// How many octets it lost.
+        octets_lost: u64,
+    },
     /// A client was turned away because there are too many already.
     ClientTurnedAway {
         /// Where it is.
@@ -51,7 +60,7 @@ pub enum Notice {
         /// What the system said.
         reason: String,
     },
-    /// A client reads too slowly and has begun to lose the oldest frames; told once per client.
+    /// A client reads too slowly and has begun to lose what is oldest; told once per client.
     ClientTooSlow {
         /// Where it is.
         client: SocketAddr,
@@ -82,6 +91,30 @@ pub enum Notice {
     AdapterSilent,
     /// The adapter sent lines that are no SLCAN; told once per port.
     AdapterGarbled,
+    /// The other side of an RS-485 line does not read what is sent, and what it has not read is
+    /// thrown away; told once per port.
+    LineUnread,
+    /// A serial port took another rate than it was told.
+    RateNotTaken {
+        /// The rate it was told.
+        asked: BaudRate,
+        /// What it has now, in bits per second.
+        taken: u32,
+    },
+    /// A serial port did not take characters of eight bits with even parity and one stop bit. What
+    /// it brings is taken all the same; parity errors pass unseen. A pty is such a port.
+    ParityNotTaken,
+    /// A serial port cannot switch the transmitter of an RS-485 driver itself. Adapters that do it
+    /// in hardware, as those for USB do, need nothing more.
+    TransmitterNotSwitched {
+        /// What the system said.
+        reason: String,
+    },
+    /// A USB adapter collects octets for some time before it hands them over.
+    AdapterHoldsBack {
+        /// For how long, in milliseconds.
+        milliseconds: u16,
+    },
 }
 
 impl Notice {
@@ -93,6 +126,7 @@ impl Notice {
             Self::ClientConnected { .. }
                 | Self::ClientOpened { .. }
                 | Self::ClientLeft { frames_lost: 0, .. }
+                | Self::TransmitterNotSwitched { .. }
         )
     }
 }
@@ -117,6 +151,9 @@ impl fmt::Display for Notice {
             Self::ClientLeft { client, frames_lost } => {
                 write!(f, "client {client} left; it had lost {frames_lost} frames")
             }
+            Self::ClientLeftShort { client, octets_lost } => {
+                write!(f, "client {client} left; it had lost {octets_lost} octets")
+            }
             Self::ClientTurnedAway { client, limit } => {
                 write!(f, "client {client} was turned away: {limit} clients are served at once")
             }
@@ -124,7 +161,7 @@ impl fmt::Display for Notice {
                 write!(f, "a client could not be let in: {reason}")
             }
             Self::ClientTooSlow { client } => {
-                write!(f, "client {client} does not read fast enough and loses the oldest frames")
+                write!(f, "client {client} does not read fast enough and loses what is oldest")
             }
             Self::FramesLost { count } => {
                 write!(f, "{count} received frames were lost: the station was not driven in time")
@@ -142,6 +179,29 @@ impl fmt::Display for Notice {
                 f.write_str("the adapter stopped confirming frames; a time-out stands in")
             }
             Self::AdapterGarbled => f.write_str("the adapter sends lines that are no SLCAN"),
+            Self::LineUnread => f.write_str(
+                "the other side does not read what is sent; what it has not read is thrown away",
+            ),
+            Self::RateNotTaken { asked, taken } => write!(
+                f,
+                "the serial port runs at {taken} bit/s where the line has {}: another adapter is \
+                 needed for this rate",
+                asked.bits_per_second()
+            ),
+            Self::ParityNotTaken => f.write_str(
+                "the serial port does not take even parity; broken characters pass unseen (a pty is \
+                 such a port)",
+            ),
+            Self::TransmitterNotSwitched { reason } => write!(
+                f,
+                "the serial port has no RS-485 mode ({reason}): the adapter must switch its \
+                 transmitter itself"
+            ),
+            Self::AdapterHoldsBack { milliseconds } => write!(
+                f,
+                "the adapter holds octets back for up to {milliseconds} ms, too long for most \
+                 masters: run setserial PORT low_latency"
+            ),
         }
     }
 }

@@ -9,7 +9,7 @@ use codewheel_station::can::{BitRate, Frame};
 
 use crate::slcan::{connect, listen};
 use crate::virtual_bus;
-use crate::{BusUri, LinkError, Notice};
+use crate::{BusUri, LinkError, Medium, Notice};
 
 /// A port to a CAN segment: frames out, frames and reports in, one place to wait.
 ///
@@ -103,12 +103,18 @@ impl fmt::Debug for Waker {
 /// Takes at most 5 s (`slcan:`, when nobody answers); the other kinds do not wait.
 ///
 /// # Errors
-/// [`LinkError`] when the address is taken or unknown, nobody answers, or the virtual bus runs at
-/// another bit rate.
+/// [`LinkError`] when the address is taken or unknown, nobody answers, the virtual bus runs at
+/// another bit rate, or the bus carries no CAN.
 pub fn open(uri: &BusUri, rate: BitRate) -> Result<Box<dyn CanPort>, LinkError> {
     Ok(match uri {
         BusUri::Virtual(name) => Box::new(virtual_bus::join(name, rate)?),
         BusUri::SlcanListen(endpoint) => Box::new(listen(endpoint, rate)?),
         BusUri::Slcan(endpoint) => Box::new(connect(endpoint, rate)?),
+        BusUri::Rs485Listen(_)
+        | BusUri::Rs485ListenPty(_)
+        | BusUri::Rs485(_)
+        | BusUri::Rs485Device(_) => {
+            return Err(LinkError::OtherMedium { uri: uri.clone(), wanted: Medium::Can });
+        }
     })
 }

@@ -2,13 +2,16 @@
 
 use std::fmt;
 use std::net::Ipv6Addr;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use thiserror::Error;
 
-/// The name of a bus: where the frames go and how to get there.
+/// The name of a bus: where the frames or octets go and how to get there.
 ///
-/// Written and read as `virtual:NAME`, `slcan-listen:HOST:PORT` or `slcan:HOST:PORT`.
+/// Written and read as `virtual:NAME`; for CAN as `slcan-listen:HOST:PORT` or `slcan:HOST:PORT`;
+/// for RS-485 as `rs485-listen:HOST:PORT`, `rs485-listen:pty:PATH`, `rs485:HOST:PORT` or
+/// `rs485:PATH`. A path begins with `/` or `.`, as `/dev/ttyUSB0` and `./line` do.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum BusUri {
@@ -19,6 +22,27 @@ pub enum BusUri {
     SlcanListen(Endpoint),
     /// `slcan:HOST:PORT`: we connect to an SLCAN adapter; the port is 1 … 65535.
     Slcan(Endpoint),
+    /// `rs485-listen:HOST:PORT`: we are the line, as raw octets, that others connect to; port 0
+    /// takes any free one.
+    Rs485Listen(Endpoint),
+    /// `rs485-listen:pty:PATH`: we are the line, and PATH becomes a serial port at which a program
+    /// on this machine finds it.
+    Rs485ListenPty(PathBuf),
+    /// `rs485:HOST:PORT`: we connect to a line that passes raw octets; the port is 1 … 65535.
+    Rs485(Endpoint),
+    /// `rs485:/dev/ttyUSB0`: a serial port of this machine.
+    Rs485Device(PathBuf),
+}
+
+/// What a bus carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Medium {
+    /// CAN frames.
+    Can,
+    /// Octets of an RS-485 line.
+    Rs485,
+    /// Whatever its stations speak: a `virtual:` bus is what it is used as.
+    Any,
 }
 
 /// A host and a TCP port: `localhost:4001`, `127.0.0.1:4001`, `[::1]:4001`.
@@ -28,11 +52,18 @@ pub struct Endpoint {
     port: u16,
 }
 
+/// How a CAN segment is written.
+const CAN_FORMS: &str = "slcan-listen:HOST:PORT or slcan:HOST:PORT for CAN";
+
+/// How an RS-485 line is written.
+const RS485_FORMS: &str = "rs485-listen:HOST:PORT, rs485-listen:pty:PATH, rs485:HOST:PORT or \
+                           rs485:/dev/tty… for RS-485";
+
 /// A text that names no bus; its message says what was given and which forms there are.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "{given:?} names no bus{why}: write virtual:NAME, slcan-listen:HOST:PORT or slcan:HOST:PORT, \
-     with an IPv6 host in brackets"
+    "{given:?} names no bus{why}: write virtual:NAME, {CAN_FORMS}, {RS485_FORMS}, with an IPv6 host \
+     in brackets"
 )]
 pub struct InvalidBusUri {
     given: String,
@@ -84,6 +115,70 @@ impl fmt::Display for Endpoint {
     }
 }
 
+impl BusUri {
+    /// What the bus carries, so that a device of another kind can be refused in time.
+    #[must_use]
+    pub const fn medium(&self) -> Medium {
+        match self {
+            Self::Virtual(_) => Medium::Any,
+            Self::SlcanListen(_) | Self::Slcan(_) => Medium::Can,
+            Self::Rs485Listen(_)
+            | Self::Rs485ListenPty(_)
+            | Self::Rs485(_)
+            | Self::Rs485Device(_) => Medium::Rs485,
+        }
+    }
+}
+
+impl Medium {
+    /// The forms of [`BusUri`] with this medium alone, in words for a message.
+    #[must_use]
+    pub const fn forms(self) -> &'static str {
+        match self {
+            Self::Can => CAN_FORMS,
+            Self::Rs485 => RS485_FORMS,
+            Self::Any => "virtual:NAME",
+        }
+    }
+}
+
+impl fmt::Display for Medium {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Can => "CAN",
+            Self::Rs485 => "RS-485",
+            Self::Any => "any",
+        })
+    }
+}
+
+/// Whether `text` is meant as a path, which no host begins like.
+fn is_path(text: &str) -> bool {
+    text.starts_with(['/', '.'])
+}
+
+/// The path that `text` is.
+fn path(text: &str) -> Result<PathBuf, &'static str> {
+    if !is_path(text) {
+        return Err(" (a path begins with / or .)");
+    }
+    if text.contains(char::is_control) {
+        return Err(" (a path has no control characters)");
+    }
+    match Path::new(text).file_name() {
+        Some(_) if !text.ends_with('/') => Ok(PathBuf::from(text)),
+        _ => Err(" (that path is a directory)"),
+    }
+}
+
+/// The endpoint that somebody else listens on.
+fn remote(text: &str) -> Result<Endpoint, &'static str> {
+    match Endpoint::parse(text)? {
+        Endpoint { port: 0, .. } => Err(" (nobody listens on port 0)"),
+        endpoint => Ok(endpoint),
+    }
+}
+
 impl FromStr for BusUri {
     type Err = InvalidBusUri;
 
@@ -99,11 +194,13 @@ impl FromStr for BusUri {
             }
             "virtual" => Ok(Self::Virtual(rest.to_owned())),
             "slcan-listen" => Endpoint::parse(rest).map(Self::SlcanListen).map_err(invalid),
-            "slcan" => match Endpoint::parse(rest) {
-                Ok(endpoint) if endpoint.port == 0 => Err(invalid(" (nobody listens on port 0)")),
-                Ok(endpoint) => Ok(Self::Slcan(endpoint)),
-                Err(why) => Err(invalid(why)),
+            "slcan" => remote(rest).map(Self::Slcan).map_err(invalid),
+            "rs485-listen" => match rest.strip_prefix("pty:") {
+                Some(link) => path(link).map(Self::Rs485ListenPty).map_err(invalid),
+                None => Endpoint::parse(rest).map(Self::Rs485Listen).map_err(invalid),
             },
+            "rs485" if is_path(rest) => path(rest).map(Self::Rs485Device).map_err(invalid),
+            "rs485" => remote(rest).map(Self::Rs485).map_err(invalid),
             _ => Err(invalid("")),
         }
     }
@@ -115,6 +212,10 @@ impl fmt::Display for BusUri {
             Self::Virtual(name) => write!(f, "virtual:{name}"),
             Self::SlcanListen(endpoint) => write!(f, "slcan-listen:{endpoint}"),
             Self::Slcan(endpoint) => write!(f, "slcan:{endpoint}"),
+            Self::Rs485Listen(endpoint) => write!(f, "rs485-listen:{endpoint}"),
+            Self::Rs485ListenPty(path) => write!(f, "rs485-listen:pty:{}", path.display()),
+            Self::Rs485(endpoint) => write!(f, "rs485:{endpoint}"),
+            Self::Rs485Device(path) => write!(f, "rs485:{}", path.display()),
         }
     }
 }
@@ -133,9 +234,33 @@ mod tests {
             "slcan-listen:[::1]:4001",
             "slcan:adapter-7.plant.example:65535",
             "slcan:[fe80::1]:4001",
+            "rs485-listen:127.0.0.1:4002",
+            "rs485-listen:[::1]:0",
+            "rs485-listen:pty:/tmp/line",
+            "rs485-listen:pty:./my line",
+            "rs485:gateway.plant.example:4002",
+            "rs485:[fe80::1]:4002",
+            "rs485:/dev/ttyUSB0",
+            "rs485:/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0-port0",
+            "rs485:../line",
         ] {
             let uri: BusUri = text.parse().unwrap();
             assert_eq!(uri.to_string(), text);
+        }
+    }
+
+    #[test]
+    fn a_bus_tells_what_it_carries() {
+        for (text, medium) in [
+            ("virtual:lab", Medium::Any),
+            ("slcan-listen:127.0.0.1:0", Medium::Can),
+            ("slcan:127.0.0.1:4001", Medium::Can),
+            ("rs485-listen:127.0.0.1:0", Medium::Rs485),
+            ("rs485-listen:pty:/tmp/line", Medium::Rs485),
+            ("rs485:127.0.0.1:4002", Medium::Rs485),
+            ("rs485:/dev/ttyS0", Medium::Rs485),
+        ] {
+            assert_eq!(text.parse::<BusUri>().unwrap().medium(), medium, "{text}");
         }
     }
 
@@ -158,10 +283,34 @@ mod tests {
             "slcan:/dev/ttyACM0",
             "slcan-listen::4001",
             "SLCAN:host:1",
+            "/dev/ttyUSB0",
+            "rs485:",
+            "rs485:ttyUSB0",
+            "rs485:/",
+            "rs485:/dev/",
+            "rs485:..",
+            "rs485:/dev/tty\n",
+            "rs485:127.0.0.1:0",
+            "rs485:pty:/tmp/line",
+            "rs485-listen:4002",
+            "rs485-listen:/dev/ttyUSB0",
+            "rs485-listen:pty:",
+            "rs485-listen:pty:line",
+            "rs485-listen:pty:/tmp/",
         ] {
             let error = text.parse::<BusUri>().expect_err(text).to_string();
             assert!(error.starts_with(&format!("{text:?} names no bus")), "{error}");
-            assert!(error.contains("virtual:NAME, slcan-listen:HOST:PORT or slcan:HOST:PORT"));
+            for form in [
+                "virtual:NAME",
+                "slcan-listen:HOST:PORT",
+                "slcan:HOST:PORT",
+                "rs485-listen:HOST:PORT",
+                "rs485-listen:pty:PATH",
+                "rs485:HOST:PORT",
+                "rs485:/dev/tty",
+            ] {
+                assert!(error.contains(form), "{form} is missing: {error}");
+            }
         }
     }
 }

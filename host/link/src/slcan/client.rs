@@ -11,15 +11,12 @@ use mio::{Interest, Token};
 
 use super::answer::{Answer, AnswerDecoder};
 use super::line::Line;
-use super::output::Output;
-use super::socket::{Limit, Watch, resolve};
 use crate::error::lost_phrase;
+use crate::output::Output;
+use crate::socket::{Limit, Watch, connect_to};
 use crate::{CanPort, Endpoint, LinkError, Notice, Received, Waker};
 
 const ADAPTER: Token = Token(1);
-
-/// How long a connection may take.
-const CONNECT_LIMIT: Duration = Duration::from_secs(5);
 
 /// How long an adapter that answers may take for one answer before it counts as silent.
 const ANSWER_LIMIT: Duration = Duration::from_secs(1);
@@ -33,7 +30,7 @@ const PIECE: usize = 4096;
 /// Connects to `endpoint` and asks the adapter there to open its channel at `rate`.
 pub(crate) fn connect(endpoint: &Endpoint, rate: BitRate) -> Result<ClientPort, LinkError> {
     let failed = |reason| LinkError::Connect { endpoint: endpoint.to_string(), reason };
-    let stream = first_answering(&resolve(endpoint)?).map_err(failed)?;
+    let stream = connect_to(endpoint)?;
     stream.set_nodelay(true).map_err(failed)?;
     stream.set_nonblocking(true).map_err(failed)?;
     let peer = stream.peer_addr().map_err(failed)?;
@@ -73,23 +70,6 @@ pub(crate) fn connect(endpoint: &Endpoint, rate: BitRate) -> Result<ClientPort, 
     Ok(port)
 }
 
-/// Tries one address after the other; together they have [`CONNECT_LIMIT`].
-fn first_answering(addresses: &[SocketAddr]) -> io::Result<std::net::TcpStream> {
-    let limit = Limit::after(Some(CONNECT_LIMIT));
-    let mut reason = io::Error::from(io::ErrorKind::TimedOut);
-    for address in addresses {
-        let left = limit.remaining().unwrap_or(CONNECT_LIMIT);
-        if left.is_zero() {
-            break;
-        }
-        match std::net::TcpStream::connect_timeout(address, left) {
-            Ok(stream) => return Ok(stream),
-            Err(error) => reason = error,
-        }
-    }
-    Err(reason)
-}
-
 /// A channel of somebody else's adapter.
 ///
 /// Adapters answer each frame with `z`, `Z` or a lone CR, or not at all. Which kind this is shows
@@ -104,7 +84,7 @@ pub(crate) struct ClientPort {
     /// The socket may hold more: it tells once, and not again before it was read to its end.
     is_unread: bool,
     decoder: AnswerDecoder,
-    output: Output,
+    output: Output<Line>,
     /// Commands whose answer is still to come, oldest first.
     commands: VecDeque<&'static str>,
     opened: Instant,

@@ -4,6 +4,8 @@ use std::fmt;
 
 use codewheel_station::can::{Frame, Identifier};
 
+use crate::output::Portion;
+
 /// Ends every line.
 pub(crate) const CR: u8 = b'\r';
 /// Says no, alone and without a CR after it.
@@ -82,6 +84,17 @@ impl Line {
             let nibble = (value >> (4 * digit)) & 0xF;
             self.push(b"0123456789ABCDEF"[nibble as usize]);
         }
+    }
+}
+
+impl Portion for Line {
+    fn as_octets(&self) -> &[u8] {
+        self.as_octets()
+    }
+
+    /// One frame, or none: a lost answer is nothing to a peer that does not read.
+    fn loss(&self) -> u64 {
+        u64::from(matches!(self.as_octets().first(), Some(b't' | b'T' | b'r' | b'R')))
     }
 }
 

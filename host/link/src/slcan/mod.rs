@@ -13,8 +13,6 @@ mod client;
 mod command;
 mod line;
 mod listen;
-mod output;
-mod socket;
 
 pub use answer::{Answer, AnswerDecoder};
 pub use channel::{Channel, Effect};

@@ -1,7 +1,7 @@
-//! What both ends of a TCP connection need: addresses, time limits, and one place to wait.
+//! What both ends of a connection need: addresses, time limits, and one place to wait.
 
 use std::io;
-use std::net::{SocketAddr, ToSocketAddrs};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -22,6 +22,31 @@ pub(crate) fn resolve(endpoint: &Endpoint) -> Result<Vec<SocketAddr>, LinkError>
         return Err(unknown(io::Error::new(io::ErrorKind::NotFound, "the name has no address")));
     }
     Ok(found)
+}
+
+/// How long a connection may take.
+const CONNECT_LIMIT: Duration = Duration::from_secs(5);
+
+/// From here on mio waits, and leaves the last millisecond to a finer clock.
+#[cfg(unix)]
+const COARSE: Duration = Duration::from_millis(2);
+
+/// Connects to `endpoint`: tries one of its addresses after the other, together for 5 s.
+pub(crate) fn connect_to(endpoint: &Endpoint) -> Result<TcpStream, LinkError> {
+    let addresses = resolve(endpoint)?;
+    let limit = Limit::after(Some(CONNECT_LIMIT));
+    let mut reason = io::Error::from(io::ErrorKind::TimedOut);
+    for address in addresses {
+        let left = limit.remaining().unwrap_or(CONNECT_LIMIT);
+        if left.is_zero() {
+            break;
+        }
+        match TcpStream::connect_timeout(&address, left) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => reason = error,
+        }
+    }
+    Err(LinkError::Connect { endpoint: endpoint.to_string(), reason })
 }
 
 /// When a wait ends.
@@ -91,10 +116,11 @@ impl Watch {
         self.woken.swap(false, Ordering::AcqRel)
     }
 
-    /// Waits for a change or a wake-up, at most `wait`. The system may round the wait up to its
-    /// clock (Linux: 1 ms), and a signal may end it early.
+    /// Waits for a change or a wake-up, at most `wait`. It may end early, so look at the time; on
+    /// Unix it ends some 0.1 ms late at most, elsewhere a tick of the system.
     pub(crate) fn wait(&mut self, wait: Option<Duration>) -> Result<(), LinkError> {
-        match self.poll.poll(&mut self.events, wait) {
+        let rest = self.wait_finely(wait)?;
+        match self.poll.poll(&mut self.events, rest) {
             Ok(()) => Ok(()),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {
                 self.events.clear();
@@ -102,6 +128,29 @@ impl Watch {
             }
             Err(error) => Err(LinkError::System(error)),
         }
+    }
+
+    /// Waits for less than [`COARSE`] as finely as the system can, and gives what is left to be
+    /// waited with mio, which knows milliseconds only and rounds up.
+    #[cfg(unix)]
+    fn wait_finely(&self, wait: Option<Duration>) -> Result<Option<Duration>, LinkError> {
+        use rustix::event::{PollFd, PollFlags, Timespec, poll};
+        let Some(wait) = wait.filter(|wait| !wait.is_zero()) else { return Ok(wait) };
+        if wait >= COARSE {
+            let whole = u64::try_from(wait.as_millis()).unwrap_or(u64::MAX);
+            return Ok(Some(Duration::from_millis(whole - 1)));
+        }
+        let limit = Timespec { tv_sec: 0, tv_nsec: wait.subsec_nanos().into() };
+        match poll(&mut [PollFd::new(self.registry(), PollFlags::IN)], Some(&limit)) {
+            Ok(_) | Err(rustix::io::Errno::INTR) => Ok(Some(Duration::ZERO)),
+            Err(error) => Err(LinkError::System(error.into())),
+        }
+    }
+
+    #[cfg(not(unix))]
+    #[allow(clippy::unused_self, clippy::unnecessary_wraps, reason = "as on Unix")]
+    fn wait_finely(&self, wait: Option<Duration>) -> Result<Option<Duration>, LinkError> {
+        Ok(wait)
     }
 
     /// What changed in the last [`wait`](Self::wait).
