@@ -1,0 +1,52 @@
+//! A PROFIBUS-DP master of class 1 on any line.
+//!
+//! [`Master`] is a [`Station`](codewheel_station::Station) and a
+//! [`rs485::Node`](codewheel_station::rs485::Node) around profirust's active station and DP master.
+//! It brings its slaves to data exchange, keeps them there, and begins anew with those that were
+//! lost or that refuse; it shares the bus with other masters by the token.
+//!
+//! | subject | |
+//! |---|---|
+//! | [`MasterSettings`], [`SlaveSettings`] | what they are told, checked before profirust could panic |
+//! | [`Master::slave`] | inputs, diagnosis, where the slave stands |
+//! | [`Master::set_outputs`], [`Master::request_diagnosis`] | what the slave gets |
+//! | [`Master::take_event`] | what happened |
+//! | [`Master::cycle_times`], [`Master::counters`] | how the bus does |
+//!
+//! # What stands between profirust and the line
+//! profirust is driven by a clock of its own (32 ticks a bit, so that no rounding shortens a pause),
+//! sees whole telegrams only, and of these only such as it can deal with. It trusts its slaves
+//! further than a line can be trusted:
+//!
+//! - two slaves that exhaust their retries by answers it did not expect, such as RS to Set_Prm
+//!   because another master owns them, end in an assertion;
+//! - a short confirmation after a passed token ends in an `unwrap` where a logger listens;
+//! - an extended diagnosis with a block of length 0 ends in a slice out of range where it is printed;
+//! - without slaves its DP master loops for ever;
+//! - two tokens from its own address silence it for good;
+//! - a slave that never gets ready, because noise confirmed a Chk_Cfg that it did not hear, is asked
+//!   for its diagnosis for ever;
+//! - a diagnosis that is asked for while an answer is awaited takes that answer for its own.
+//!
+//! So answers pass only from the slave that was asked, to this master, with the SAPs, the kind and
+//! the length that the request calls for; other answers count as none. Requests and tokens of other
+//! masters pass. After a collision of addresses the master rejoins the bus a second later; a slave that
+//! is not ready two seconds after its Chk_Cfg is begun anew; what users set waits for the answer.
+
+mod clock;
+mod event;
+mod judge;
+mod line;
+mod master;
+mod settings;
+mod slave;
+mod station;
+mod telegram;
+
+pub use event::{EVENTS, Event};
+pub use master::{Counters, Master, NotSet, UnknownSlave};
+pub use settings::{
+    DATA_OCTETS, HIGHEST_ADDRESS, LONGEST_SLOT, MasterSettings, SettingsError, SlaveSettings,
+    USER_PARAMETER_OCTETS, shortest_slot,
+};
+pub use slave::{CycleTimes, Diagnosis, Service, SlaveState, SlaveView};
