@@ -29,9 +29,9 @@ pub trait Application {
     /// [`Refused`]: Prm_Fault.
     fn parameterize(&mut self, now: Instant, user: &[u8]) -> Result<(), Refused>;
 
-    /// The slave left WAIT_CFG or DATA_EXCH for WAIT_PRM with a Set_Prm that was found bad before
-    /// [`parameterize`](Self::parameterize) was asked: wrong ident number, a watchdog factor of 0,
-    /// octet 8.
+    /// A Set_Prm was found bad before [`parameterize`](Self::parameterize) was asked: too short, a
+    /// watchdog factor of 0, wrong ident number, octet 8. The slave is in WAIT_PRM after it, and may
+    /// have been there before.
     fn parameters_refused(&mut self, now: Instant);
 
     /// Judges the identifiers of Chk_Cfg and takes them where they are good.

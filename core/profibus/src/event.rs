@@ -65,6 +65,11 @@ pub enum Event {
     },
     /// Parameters were refused for what the standard says about them.
     ParametersRefused(ParameterFault),
+    /// Parameters were taken though bits of station status are set that mean nothing.
+    ReservedStationStatus {
+        /// These bits, of 0 to 2.
+        bits: u8,
+    },
     /// The configuration was accepted: DATA_EXCH.
     DataExchange {
         /// The master.
@@ -123,6 +128,9 @@ impl fmt::Display for Event {
             Self::BaudRateLost => f.write_str("baud rate lost, searching"),
             Self::Parameterized { master } => write!(f, "parameterized by master {master}"),
             Self::ParametersRefused(fault) => write!(f, "parameters refused: {fault}"),
+            Self::ReservedStationStatus { bits } => {
+                write!(f, "Set_Prm octet 1: reserved bits {bits:02X}h are set, and ignored")
+            }
             Self::DataExchange { master } => write!(f, "data exchange with master {master}"),
             Self::Lost(Loss::Watchdog) => {
                 f.write_str("the master was silent longer than the watchdog time")

@@ -15,9 +15,20 @@
 #[cfg(test)]
 extern crate std;
 
+mod answer;
 mod application;
+mod baud_search;
 mod event;
+pub mod function_code;
+mod machine;
+mod parameters;
+mod process_data;
+mod receiver;
+mod responder;
+pub mod sap;
 mod slave;
+pub mod telegram;
+mod watchdog;
 
 pub use application::{Application, Lengths, Refused};
 pub use event::{Event, Loss, ParameterFault};

@@ -3,7 +3,16 @@
 use codewheel_station::rs485::{BaudRate, Input, Transmission};
 use codewheel_station::{Duration, Instant};
 
-use crate::Application;
+use crate::baud_search::{BaudSearch, Change};
+use crate::function_code::{Function, Reply};
+use crate::machine::Machine;
+use crate::receiver::{Received, Receiver};
+use crate::responder::{Answer, Owed, Responder};
+use crate::telegram::{BROADCAST, Data, Telegram};
+use crate::{Application, Event, sap};
+
+/// The highest address that a station can have.
+const LAST_STATION: u8 = 125;
 
 /// How the slave comes to its rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,38 +82,233 @@ pub struct Counters {
     pub broken: u32,
 }
 
-/// A DP-V0 slave with at most `N` octets of inputs and as many of outputs.
+/// A DP-V0 slave with at most `N` octets of inputs and as many of outputs. A configuration that
+/// needs more is refused.
 #[derive(Clone, Debug)]
 pub struct Slave<const N: usize> {
     settings: Settings,
+    counters: Counters,
+    baud: BaudSearch,
+    machine: Machine<N>,
+    receiver: Receiver,
+    responder: Responder,
 }
 
 impl<const N: usize> Slave<N> {
     /// A slave at power-up: WAIT_PRM, no master.
     #[must_use]
-    pub const fn new(settings: Settings) -> Self {
-        Self { settings }
+    pub fn new(settings: Settings) -> Self {
+        let baud = BaudSearch::new(settings.baud);
+        Self {
+            settings,
+            counters: Counters { telegrams: 0, requests: 0, retries: 0, broken: 0 },
+            responder: Responder::new(baud.rate()),
+            baud,
+            machine: Machine::new(settings.ident_number),
+            receiver: Receiver::new(settings.timing),
+        }
     }
 
-    /// Takes in what arrived at `now`.
-    pub fn handle<A: Application>(&mut self, _now: Instant, _input: Input<'_>, _app: &mut A) {}
+    /// Takes in what arrived at `now`. Call [`transmit`](Self::transmit) and read
+    /// [`deadline`](Self::deadline) next.
+    pub fn handle<A: Application>(&mut self, now: Instant, input: Input<'_>, app: &mut A) {
+        self.watch_master(now, app);
+        // The rate changes after the octets that were received at it.
+        match input {
+            Input::Octets(octets) => self.octets(now, octets, app),
+            Input::BrokenCharacter => {
+                self.responder.cancel();
+                self.receiver.drop_until_idle(now);
+                self.count_broken();
+            }
+        }
+        self.search_rate(now, app);
+    }
 
-    /// Runs whatever fell due up to `now`.
-    pub fn advance<A: Application>(&mut self, _now: Instant, _app: &mut A) {}
+    /// Runs whatever fell due up to `now`: the watchdog, and the search for the rate of the line.
+    pub fn advance<A: Application>(&mut self, now: Instant, app: &mut A) {
+        self.watch_master(now, app);
+        self.search_rate(now, app);
+    }
 
-    /// The answer that is owed, from its time on.
-    pub fn transmit<A: Application>(
+    #[inline]
+    fn watch_master<A: Application>(&mut self, now: Instant, app: &mut A) {
+        if self.machine.advance(now, app) {
+            self.responder.cancel();
+            self.responder.forget();
+        }
+    }
+
+    #[inline]
+    fn search_rate<A: Application>(&mut self, now: Instant, app: &mut A) {
+        let Some(change) = self.baud.advance(now) else { return };
+        self.responder.cancel();
+        self.responder.set_rate(self.baud.rate());
+        self.receiver.drop_until_idle(now);
+        if change == Change::Lost {
+            app.notice(now, Event::BaudRateLost);
+        }
+    }
+
+    #[inline]
+    fn octets<A: Application>(&mut self, now: Instant, octets: &[u8], app: &mut A) {
+        if octets.is_empty() {
+            return;
+        }
+        if self.receiver.arrive(now, octets.len(), self.baud.rate()) {
+            self.count_broken();
+        }
+        let mut rest = octets;
+        while !rest.is_empty() {
+            // Whoever sends now has not waited for the answer.
+            self.responder.cancel();
+            let copy;
+            let (telegram, octets) = if let Some((telegram, behind)) = self.receiver.whole(rest) {
+                let octets = rest.get(..telegram.length()).unwrap_or(rest);
+                rest = behind;
+                (telegram, octets)
+            } else {
+                let (used, received) = self.receiver.take(rest);
+                rest = rest.get(used..).unwrap_or_default();
+                if received == Received::Broken {
+                    self.count_broken();
+                }
+                if received != Received::Telegram {
+                    continue;
+                }
+                // The receiver goes on with its buffer while the telegram is executed.
+                copy = Transmission::new(self.receiver.pieced());
+                let octets = copy.as_ref().map_or(&[][..], Transmission::octets);
+                let Ok(Some(telegram)) = Telegram::decode(octets) else { continue };
+                (telegram, octets)
+            };
+            self.telegram(now, &telegram, octets, app);
+        }
+    }
+
+    /// A telegram that ended at `now`; `octets` are all of it.
+    #[inline]
+    fn telegram<A: Application>(
         &mut self,
-        _now: Instant,
-        _app: &mut A,
-    ) -> Option<Transmission> {
-        None
+        now: Instant,
+        telegram: &Telegram<'_>,
+        octets: &[u8],
+        app: &mut A,
+    ) {
+        count(&mut self.counters.telegrams);
+        let after_idle = self.receiver.end_telegram();
+        match telegram {
+            Telegram::Data(data) => {
+                if self.baud.heard(now) {
+                    app.notice(now, Event::BaudRateFound(self.baud.rate()));
+                }
+                if let Some(function) = data.function_code().function() {
+                    if after_idle {
+                        self.request(now, function, data, octets, app);
+                    } else {
+                        count(&mut self.counters.broken);
+                    }
+                }
+            }
+            Telegram::Token { .. } => self.responder.forget(),
+            Telegram::ShortAcknowledge => {}
+        }
     }
 
-    /// When [`advance`](Self::advance) or [`transmit`](Self::transmit) must be called at the latest.
+    #[inline]
+    fn request<A: Application>(
+        &mut self,
+        now: Instant,
+        function: Function,
+        data: &Data<'_>,
+        octets: &[u8],
+        app: &mut A,
+    ) {
+        let (destination, master) = (data.destination(), data.source());
+        if master > LAST_STATION || master == self.settings.address {
+            return;
+        }
+        let unacknowledged = matches!(function, Function::SdnLow | Function::SdnHigh);
+        if destination == self.settings.address && !unacknowledged {
+            self.answer(now, function, data, octets, app);
+        } else if destination == self.settings.address || destination == BROADCAST {
+            let saps = data.saps().ok().flatten();
+            if unacknowledged && saps.is_some_and(|saps| saps.destination == sap::GLOBAL_CONTROL) {
+                self.machine.global_control(now, master, data.data(), app);
+            }
+        } else {
+            self.responder.forget();
+        }
+    }
+
+    /// A request to this station that demands an answer.
+    #[inline]
+    fn answer<A: Application>(
+        &mut self,
+        now: Instant,
+        function: Function,
+        data: &Data<'_>,
+        octets: &[u8],
+        app: &mut A,
+    ) {
+        let code = data.function_code();
+        let master = data.source();
+        let due = self.responder.answer_time(now);
+        let for_data = matches!(function, Function::SrdLow | Function::SrdHigh);
+        if for_data && self.machine.master == Some(master) {
+            self.machine.watchdog.retrigger(now);
+        }
+        if code.frame_count_valid() && self.responder.is_retry(code, octets) {
+            count(&mut self.counters.retries);
+            self.responder.owe_again(due);
+            return;
+        }
+        count(&mut self.counters.requests);
+        let counted = code.frame_count() || code.frame_count_valid();
+        if counted && function != Function::FdlStatus {
+            self.responder.remember(code, octets);
+        } else {
+            self.responder.forget();
+        }
+        let (answer, saps) = match (data.saps(), for_data) {
+            (Ok(None), true) => (self.machine.exchange(now, master, data.unit(), app), None),
+            (Ok(Some(saps)), true) => {
+                let service = saps.destination;
+                let answer = self.machine.serve(now, master, service, data.data(), app);
+                // Set_Prm may have changed it, from the next answer on.
+                self.responder.set_station_delay(self.machine.station_delay, self.baud.rate());
+                (answer, Some(saps.swapped()))
+            }
+            (Ok(_), _) if function == Function::FdlStatus => (Answer::Bare(Reply::Ok), None),
+            _ => (Answer::Bare(Reply::NotActivated), None),
+        };
+        self.responder.owe(Owed { answer, master, saps }, due);
+    }
+
+    /// At a rate that is only tried nothing is known to be broken.
+    fn count_broken(&mut self) {
+        if self.baud.is_settled() {
+            self.counters.broken = self.counters.broken.saturating_add(1);
+        }
+    }
+
+    /// The answer that is owed, from its time on. Inputs and diagnosis are those of this call.
+    pub fn transmit<A: Application>(&mut self, now: Instant, app: &mut A) -> Option<Transmission> {
+        let owed = self.responder.take_due(now)?;
+        if !self.responder.is_built() {
+            let Self { machine, responder, settings, .. } = self;
+            let length = machine.build(now, settings.address, owed, &mut responder.answer, app)?;
+            responder.set_built(length);
+        }
+        self.responder.transmission()
+    }
+
+    /// When [`advance`](Self::advance) or [`transmit`](Self::transmit) must be called at the
+    /// latest. A search for the rate wants its first call at once: the origin of time.
     #[must_use]
-    pub const fn deadline(&self) -> Option<Instant> {
-        None
+    pub fn deadline(&self) -> Option<Instant> {
+        let due = self.responder.due().or_earlier(self.machine.watchdog.expires());
+        due.or_earlier(self.baud.deadline()).instant()
     }
 
     /// What it was told at power-up.
@@ -116,57 +320,65 @@ impl<const N: usize> Slave<N> {
     /// The rate it listens at, found or only tried.
     #[must_use]
     pub const fn baud_rate(&self) -> BaudRate {
-        match self.settings.baud {
-            Baud::Fixed(rate) => rate,
-            Baud::Search => BaudRate::Mbit12,
-        }
+        self.baud.rate()
     }
 
     /// Whether the rate is given or has been found.
     #[must_use]
     pub const fn has_baud_rate(&self) -> bool {
-        matches!(self.settings.baud, Baud::Fixed(_))
+        self.baud.is_settled()
     }
 
     /// Its state.
     #[must_use]
     pub const fn state(&self) -> State {
-        State::WaitPrm
+        self.machine.state
     }
 
     /// The master it is locked by.
     #[must_use]
     pub const fn master(&self) -> Option<u8> {
-        None
+        self.machine.master
     }
 
     /// The watchdog time, while the watchdog is on.
     #[must_use]
     pub const fn watchdog(&self) -> Option<Duration> {
-        None
+        self.machine.watchdog.period()
+    }
+
+    /// Min T_SDR, 11 … 255 bits: how long an answer waits after its request.
+    #[must_use]
+    pub const fn station_delay(&self) -> u8 {
+        self.machine.station_delay
     }
 
     /// The fault bits.
     #[must_use]
     pub const fn faults(&self) -> Faults {
-        Faults { parameters: false, configuration: false, not_supported: false }
+        self.machine.faults
     }
 
     /// Whether it is in Sync mode: outputs wait for the next Sync.
     #[must_use]
     pub const fn is_in_sync_mode(&self) -> bool {
-        false
+        self.machine.data.sync
     }
 
     /// Whether it is in Freeze mode: inputs stay as they were at the last Freeze.
     #[must_use]
     pub const fn is_in_freeze_mode(&self) -> bool {
-        false
+        self.machine.data.freeze
     }
 
     /// What has been counted.
     #[must_use]
     pub const fn counters(&self) -> Counters {
-        Counters { telegrams: 0, requests: 0, retries: 0, broken: 0 }
+        self.counters
     }
+}
+
+#[inline]
+fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
 }

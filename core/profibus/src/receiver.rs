@@ -1,0 +1,186 @@
+//! From octets and pauses to telegrams.
+
+use codewheel_station::rs485::{BaudRate, TRANSMISSION_OCTETS};
+use codewheel_station::{Duration, Instant};
+
+use crate::Timing;
+use crate::telegram::{Telegram, length_of};
+
+/// A port that knows no bit times gives a telegram up after so long without an octet. The standard
+/// says 33 bits; at every rate that is less, which a test holds.
+const ABANDONED_AFTER: Duration = Duration::from_millis(50);
+/// Such a port takes a pause this long for an idle line, or 33 bits where they last longer.
+const QUIET: Duration = Duration::from_millis(1);
+
+/// What octets turned out to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Received {
+    /// The beginning of a telegram.
+    More,
+    /// No telegram, and the first to show it: what follows is dropped up to the next pause.
+    Broken,
+    /// Octets behind a broken telegram.
+    Dropped,
+    /// The end of a telegram: [`Receiver::pieced`] has all of it.
+    Telegram,
+}
+
+/// Puts telegrams together. A broken one is dropped with all that follows until the line is idle:
+/// to look for the next start delimiter inside of it would take payload for a telegram.
+#[derive(Clone, Debug)]
+pub(crate) struct Receiver {
+    timing: Timing,
+    /// Everything is dropped until the line is idle.
+    dropping: bool,
+    /// The line was idle before the octet that comes next, or before the telegram begun.
+    after_idle: bool,
+    /// When the last octet ended; `None` before the first one.
+    last: Option<Instant>,
+    filled: u8,
+    buffer: [u8; TRANSMISSION_OCTETS],
+}
+
+impl Receiver {
+    pub(crate) const fn new(timing: Timing) -> Self {
+        Self {
+            timing,
+            dropping: false,
+            after_idle: true,
+            last: None,
+            filled: 0,
+            buffer: [0; TRANSMISSION_OCTETS],
+        }
+    }
+
+    /// Drops everything until the line is idle. A character with an error ended at `now`, or the
+    /// rate is another from now on, and what comes next may be the middle of a telegram.
+    pub(crate) fn drop_until_idle(&mut self, now: Instant) {
+        self.filled = 0;
+        self.dropping = true;
+        self.last = Some(now);
+    }
+
+    /// Judges the pause before `count` octets that end at `now`; [`take`](Self::take) them next.
+    /// Says whether a telegram begun before was abandoned.
+    #[inline]
+    pub(crate) fn arrive(&mut self, now: Instant, count: usize, rate: BaudRate) -> bool {
+        let Some(last) = self.last.replace(now) else { return false };
+        match self.timing {
+            Timing::Exact => self.arrive_exactly(now, count, rate, last),
+            Timing::Coarse => {
+                if !self.dropping && self.filled == 0 {
+                    return false;
+                }
+                let pause = now.since(last);
+                let abandoned = self.filled > 0 && pause >= ABANDONED_AFTER;
+                if abandoned {
+                    self.filled = 0;
+                }
+                if pause >= QUIET.max(rate.bits(33)) {
+                    self.dropping = false;
+                }
+                abandoned
+            }
+        }
+    }
+
+    /// Bits are counted to the nearest half: a UART does no better, and spans of time are rounded.
+    fn arrive_exactly(
+        &mut self,
+        now: Instant,
+        count: usize,
+        rate: BaudRate,
+        last: Instant,
+    ) -> bool {
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        let pause = (now - rate.characters(count)).since(last).times(2);
+        let idle = pause >= rate.bits(65);
+        let abandoned = self.filled > 0 && pause >= rate.bits(1);
+        if abandoned {
+            self.filled = 0;
+            self.dropping = true;
+        }
+        if idle {
+            self.dropping = false;
+        }
+        if self.filled == 0 {
+            self.after_idle = idle;
+        }
+        abandoned
+    }
+
+    /// The telegram that lies whole at the beginning of `octets`, and what lies behind it; `None`
+    /// where these octets are to be [taken](Self::take) one by one. Nothing is copied.
+    #[inline]
+    pub(crate) fn whole<'a>(&self, octets: &'a [u8]) -> Option<(Telegram<'a>, &'a [u8])> {
+        if self.dropping || self.filled > 0 {
+            return None;
+        }
+        let telegram = Telegram::decode(octets).ok().flatten()?;
+        Some((telegram, octets.get(telegram.length()..)?))
+    }
+
+    /// Takes octets that [`arrive`](Self::arrive) announced, up to the end of the first telegram,
+    /// and says how many that were.
+    pub(crate) fn take(&mut self, octets: &[u8]) -> (usize, Received) {
+        if self.dropping {
+            return (octets.len(), Received::Dropped);
+        }
+        let mut used = 0;
+        loop {
+            let begun = self.pieced();
+            let filled = begun.len();
+            let length = match Telegram::decode(begun) {
+                Ok(Some(_)) => return (used, Received::Telegram),
+                Ok(None) => length_of(begun).unwrap_or_default(),
+                Err(_) => {
+                    self.filled = 0;
+                    self.dropping = true;
+                    return (octets.len(), Received::Broken);
+                }
+            };
+            // As long as the length is not known, one by one: damage shows as early as in one piece.
+            let wanted = length.map_or(1, |length| length.saturating_sub(filled));
+            let rest = octets.get(used..).unwrap_or_default();
+            if rest.is_empty() {
+                return (used, Received::More);
+            }
+            let piece = rest.get(..wanted).unwrap_or(rest);
+            self.append(piece);
+            used += piece.len();
+        }
+    }
+
+    /// The octets of the telegram that came in pieces.
+    pub(crate) fn pieced(&self) -> &[u8] {
+        self.buffer.get(..usize::from(self.filled)).unwrap_or_default()
+    }
+
+    /// A telegram was taken; the next one follows without a pause. Says whether the line was idle
+    /// before this one, as long as a request demands.
+    #[inline]
+    pub(crate) fn end_telegram(&mut self) -> bool {
+        self.filled = 0;
+        let coarse = self.timing == Timing::Coarse;
+        core::mem::replace(&mut self.after_idle, coarse)
+    }
+
+    fn append(&mut self, octets: &[u8]) {
+        let begin = usize::from(self.filled);
+        let end = begin.saturating_add(octets.len());
+        if let (Some(room), Ok(filled)) = (self.buffer.get_mut(begin..end), u8::try_from(end)) {
+            room.copy_from_slice(octets);
+            self.filled = filled;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fifty_milliseconds_are_longer_than_thirty_three_bits_at_every_rate() {
+        assert!(BaudRate::ALL.iter().all(|rate| rate.bits(33) < ABANDONED_AFTER));
+    }
+}

@@ -1,0 +1,152 @@
+//! Broken telegrams, and how the slave finds back.
+
+use codewheel_profibus::{Baud, Timing};
+use codewheel_station::Duration;
+use codewheel_station::rs485::{BaudRate, Input};
+
+use crate::bench::{Bench, octets};
+
+const FDL_STATUS: &str = "10 07 02 49 52 16";
+const ANSWER: &str = "10 02 07 00 09 16";
+
+#[test]
+fn a_broken_telegram_meets_silence_and_is_counted() {
+    for (what, hex) in [
+        ("checksum", "10 07 02 49 53 16"),
+        ("end delimiter", "10 07 02 49 52 17"),
+        ("lengths that differ", "68 05 06 68 87 82 6C 3C 3E EF 16"),
+        ("length too short", "68 03 03 68 07 02 49 52 16"),
+        ("length too long", "68 FA FA 68 07 02 49 52 16"),
+        ("SD2 not repeated", "68 05 05 10 87 82 6C 3C 3E EF 16"),
+        ("no start delimiter", "17 10 07 02 49 52 16"),
+    ] {
+        for mut bench in [Bench::power_up(), Bench::on_a_pc()] {
+            bench.says(hex, "");
+            assert_eq!(bench.slave.counters().broken, 1, "{what}");
+            bench.wait(Duration::from_millis(1));
+            bench.says(FDL_STATUS, ANSWER);
+        }
+    }
+}
+
+#[test]
+fn a_telegram_inside_a_broken_one_is_not_taken() {
+    for mut bench in [Bench::power_up(), Bench::on_a_pc()] {
+        bench.says(&format!("68 10 11 68 {FDL_STATUS}"), "");
+        assert_eq!(bench.slave.counters().telegrams, 0);
+    }
+}
+
+#[test]
+fn with_bit_times_thirty_three_idle_bits_end_a_broken_telegram() {
+    for (pause, answer) in [(32, ""), (33, ANSWER)] {
+        let mut bench = Bench::power_up();
+        bench.hears("10 07 02 49 53 16");
+        bench.hears_after(pause, &octets(FDL_STATUS));
+        assert_eq!(bench.answer(), answer, "{pause} bits");
+    }
+}
+
+#[test]
+fn without_them_a_pause_of_a_millisecond_does_or_of_thirty_three_bits_at_the_slowest_rates() {
+    for (rate, micros) in [
+        (BaudRate::Mbit12, 1_000),
+        (BaudRate::Kbit93_75, 1_000),
+        (BaudRate::Kbit19_2, 1_719),
+        (BaudRate::Kbit9_6, 3_438),
+    ] {
+        for (pause, answer) in [(micros - 1, ""), (micros, ANSWER)] {
+            let mut bench = Bench::new(Baud::Fixed(rate), Timing::Coarse);
+            bench.hears("10 07 02 49 53 16");
+            bench.wait(Duration::from_micros(pause));
+            bench.slave.handle(bench.now, Input::Octets(&octets(FDL_STATUS)), &mut bench.toy);
+            assert_eq!(bench.answer(), answer, "{pause} µs at {rate}");
+        }
+    }
+}
+
+#[test]
+fn garbage_that_goes_on_keeps_the_slave_deaf() {
+    for mut bench in [Bench::power_up(), Bench::on_a_pc()] {
+        bench.hears("17");
+        for _ in 0..10 {
+            bench.hears_after(20, &octets(FDL_STATUS));
+            assert_eq!(bench.slave.deadline(), None);
+        }
+        assert_eq!(bench.slave.counters().broken, 1, "one piece of garbage");
+    }
+}
+
+#[test]
+fn with_bit_times_a_gap_of_one_bit_breaks_a_telegram() {
+    for (gap, answer) in [(0, ANSWER), (1, "")] {
+        let mut bench = Bench::power_up();
+        bench.hears("10 07 02");
+        bench.hears_after(gap, &octets("49 52 16"));
+        assert_eq!(bench.answer(), answer, "{gap} bits");
+        assert_eq!(bench.slave.counters().broken, u32::from(gap > 0));
+    }
+}
+
+#[test]
+fn with_bit_times_a_telegram_that_was_cut_off_does_not_spoil_the_next() {
+    let mut bench = Bench::power_up();
+    bench.hears("68 05 05 68 87 82");
+    bench.says(FDL_STATUS, ANSWER);
+    assert_eq!(bench.slave.counters().broken, 1);
+}
+
+#[test]
+fn without_them_a_telegram_is_waited_for_fifty_milliseconds() {
+    for (millis, answer) in [(49, ANSWER), (50, "")] {
+        let mut bench = Bench::on_a_pc();
+        bench.hears("10 07 02");
+        bench.wait(Duration::from_millis(millis));
+        bench.slave.handle(bench.now, Input::Octets(&octets("49 52 16")), &mut bench.toy);
+        assert_eq!(bench.answer(), answer, "{millis} ms");
+    }
+    let mut bench = Bench::on_a_pc();
+    bench.hears("68 05 05 68 87 82");
+    bench.wait(Duration::from_millis(50));
+    bench.says(FDL_STATUS, ANSWER);
+    assert_eq!(bench.slave.counters().broken, 1, "what was cut off");
+}
+
+#[test]
+fn with_bit_times_a_request_demands_an_idle_line() {
+    for (pause, answer) in [(11, ""), (32, ""), (33, ANSWER), (100, ANSWER)] {
+        let mut bench = Bench::power_up();
+        bench.hears("DC 02 02");
+        bench.hears_after(pause, &octets(FDL_STATUS));
+        assert_eq!(bench.answer(), answer, "{pause} bits after a token");
+    }
+    let mut bench = Bench::on_a_pc();
+    bench.hears("DC 02 02");
+    bench.hears_after(11, &octets(FDL_STATUS));
+    assert_eq!(bench.answer(), ANSWER, "on a PC none is demanded");
+}
+
+#[test]
+fn with_bit_times_telegrams_may_come_octet_by_octet() {
+    for rate in BaudRate::ALL {
+        let mut bench = Bench::new(Baud::Fixed(rate), Timing::Exact);
+        bench.hears("DC 02 02");
+        for (place, octet) in octets(FDL_STATUS).into_iter().enumerate() {
+            bench.hears_after(if place == 0 { 33 } else { 0 }, &[octet]);
+        }
+        assert_eq!(bench.answer(), ANSWER, "{rate}");
+    }
+}
+
+#[test]
+fn a_broken_character_breaks_the_telegram_it_stands_in() {
+    for mut bench in [Bench::power_up(), Bench::on_a_pc()] {
+        bench.hears("10 07 02");
+        bench.slave.handle(bench.now, Input::BrokenCharacter, &mut bench.toy);
+        bench.hears_after(0, &octets("52 16"));
+        assert_eq!(bench.answer(), "");
+        assert_eq!(bench.slave.counters().broken, 1);
+        bench.wait(Duration::from_millis(1));
+        bench.says(FDL_STATUS, ANSWER);
+    }
+}
