@@ -63,7 +63,7 @@ struct Segment {
 impl Segment {
     /// A segment on which all encoders are polled.
     fn new(rate: BitRate, turning: bool) -> Self {
-        let mut wire = Wire::new(rate, 1);
+        let mut wire: Wire<Node> = Wire::new(rate, 1);
         let identity = ScannerIdentity { vendor: 1, serial: 1 };
         let mut scanner = Scanner::new(mac(0), identity, Duration::ZERO);
         // Explicit responses of high MAC IDs lose against every poll: while the slaves are

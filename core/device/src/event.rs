@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use codewheel_encoder::ssi::LineFault;
 use codewheel_station::Instant;
 
 /// Something that happened to a device.
@@ -11,15 +12,25 @@ pub enum Event {
     PowerUp,
     /// On the network side.
     Network(codewheel_devicenet::Event),
+    /// On the PROFIBUS side.
+    Profibus(codewheel_profibus::Event),
     /// The address switches give no address of the bus.
     IllegalAddress {
         /// Where they stand, 64 … 99.
         switches: u8,
     },
+    /// What the master of a PROFIBUS encoder sent is refused.
+    Refused(crate::profibus::Refusal),
+    /// What the master of a PROFIBUS encoder sent has a consequence that people should know.
+    Remark(crate::profibus::Remark),
     /// Two samples lie further apart than the shaft can turn.
     PositionError,
     /// The position error has ended by itself.
     PositionErrorEnded,
+    /// The SSI line of a converter cannot be read, or has another fault than before.
+    LineFault(LineFault),
+    /// The SSI line can be read again.
+    LineRight,
     /// The voltage of the lithium cell is too low.
     CellLow,
     /// The voltage of the lithium cell is right again.
@@ -51,17 +62,21 @@ impl Event {
     /// Whether something went wrong that a person should look at.
     #[must_use]
     pub const fn is_trouble(&self) -> bool {
-        matches!(
-            self,
+        match self {
+            Self::Profibus(event) => event.is_trouble(),
+            Self::Remark(remark) => remark.is_trouble(),
             Self::Network(codewheel_devicenet::Event::Faulted(_))
-                | Self::IllegalAddress { .. }
-                | Self::PositionError
-                | Self::CellLow
-                | Self::KeepFailed
-                | Self::MemoryDamaged
-                | Self::FirstWriteInterrupted
-                | Self::RecordDamaged
-        )
+            | Self::IllegalAddress { .. }
+            | Self::Refused(_)
+            | Self::PositionError
+            | Self::LineFault(_)
+            | Self::CellLow
+            | Self::KeepFailed
+            | Self::MemoryDamaged
+            | Self::FirstWriteInterrupted
+            | Self::RecordDamaged => true,
+            _ => false,
+        }
     }
 }
 
@@ -70,11 +85,16 @@ impl fmt::Display for Event {
         match self {
             Self::PowerUp => f.write_str("power up"),
             Self::Network(event) => event.fmt(f),
+            Self::Profibus(event) => event.fmt(f),
             Self::IllegalAddress { switches } => {
                 write!(f, "address switches at {switches}: DeviceNet has 0–63")
             }
+            Self::Refused(refusal) => refusal.tell(f),
+            Self::Remark(remark) => remark.fmt(f),
             Self::PositionError => f.write_str("position error: the code jumped"),
             Self::PositionErrorEnded => f.write_str("position error ended"),
+            Self::LineFault(fault) => fault.fmt(f),
+            Self::LineRight => f.write_str("the SSI line brings words again"),
             Self::CellLow => f.write_str("lithium cell: voltage too low"),
             Self::CellRight => f.write_str("lithium cell: voltage right again"),
             Self::SettingChanged { attribute } => write!(f, "2f/1/{attribute} changed"),
@@ -96,13 +116,84 @@ impl fmt::Display for Event {
     }
 }
 
+/// What can happen to a device on any bus.
+///
+/// [`Event`] is as wide as the widest event of any bus; the ring of each bus holds a type of its own,
+/// so that no device pays for what it never says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Happening {
+    PowerUp,
+    PositionError,
+    PositionErrorEnded,
+    LineFault(LineFault),
+    LineRight,
+    CellLow,
+    CellRight,
+    Preset,
+    KeepFailed,
+    MemoryDamaged,
+    FirstWriteInterrupted,
+    RecordDamaged,
+}
+
+impl From<Happening> for Event {
+    fn from(happening: Happening) -> Self {
+        match happening {
+            Happening::PowerUp => Self::PowerUp,
+            Happening::PositionError => Self::PositionError,
+            Happening::PositionErrorEnded => Self::PositionErrorEnded,
+            Happening::LineFault(fault) => Self::LineFault(fault),
+            Happening::LineRight => Self::LineRight,
+            Happening::CellLow => Self::CellLow,
+            Happening::CellRight => Self::CellRight,
+            Happening::Preset => Self::Preset,
+            Happening::KeepFailed => Self::KeepFailed,
+            Happening::MemoryDamaged => Self::MemoryDamaged,
+            Happening::FirstWriteInterrupted => Self::FirstWriteInterrupted,
+            Happening::RecordDamaged => Self::RecordDamaged,
+        }
+    }
+}
+
+/// What a DeviceNet encoder tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DeviceNetEvent {
+    Device(Happening),
+    Network(codewheel_devicenet::Event),
+    IllegalAddress { switches: u8 },
+    SettingChanged { attribute: u8 },
+    Saved,
+    Restored,
+    Reset,
+}
+
+impl From<Happening> for DeviceNetEvent {
+    fn from(happening: Happening) -> Self {
+        Self::Device(happening)
+    }
+}
+
+impl From<DeviceNetEvent> for Event {
+    fn from(event: DeviceNetEvent) -> Self {
+        match event {
+            DeviceNetEvent::Device(happening) => happening.into(),
+            DeviceNetEvent::Network(event) => Self::Network(event),
+            DeviceNetEvent::IllegalAddress { switches } => Self::IllegalAddress { switches },
+            DeviceNetEvent::SettingChanged { attribute } => Self::SettingChanged { attribute },
+            DeviceNetEvent::Saved => Self::Saved,
+            DeviceNetEvent::Restored => Self::Restored,
+            DeviceNetEvent::Reset => Self::Reset,
+        }
+    }
+}
+
 /// How many events wait to be fetched before the oldest is lost.
 const EVENTS: usize = 6;
 
 /// The last events, with a count of those lost.
 #[derive(Clone, Debug)]
-pub(crate) struct Events {
-    events: [Option<Event>; EVENTS],
+pub(crate) struct Events<E> {
+    events: [Option<E>; EVENTS],
     /// When each of them happened; apart from them, since together they would take half as much
     /// again.
     times: [Instant; EVENTS],
@@ -110,16 +201,16 @@ pub(crate) struct Events {
     lost: u32,
 }
 
-impl Events {
+impl<E: Copy> Events<E> {
     pub(crate) const fn new() -> Self {
         Self { events: [None; EVENTS], times: [Instant::ZERO; EVENTS], next: 0, lost: 0 }
     }
 
-    pub(crate) fn push(&mut self, now: Instant, event: Event) {
+    pub(crate) fn push(&mut self, now: Instant, event: impl Into<E>) {
         let next = usize::from(self.next);
         if let (Some(place), Some(time)) = (self.events.get_mut(next), self.times.get_mut(next)) {
             *time = now;
-            if place.replace(event).is_some() {
+            if place.replace(event.into()).is_some() {
                 self.lost = self.lost.saturating_add(1);
             }
         }
@@ -127,7 +218,7 @@ impl Events {
     }
 
     /// The oldest event not yet fetched.
-    pub(crate) fn take(&mut self) -> Option<(Instant, Event)> {
+    pub(crate) fn take(&mut self) -> Option<(Instant, E)> {
         let (newer, older) = self.events.split_at_mut_checked(usize::from(self.next))?;
         let (newer_times, older_times) = self.times.split_at_checked(usize::from(self.next))?;
         let older = older.iter_mut().zip(older_times);
@@ -146,7 +237,7 @@ mod tests {
 
     #[test]
     fn events_come_in_order_and_the_oldest_are_lost_and_counted() {
-        let mut events = Events::new();
+        let mut events = Events::<Event>::new();
         assert_eq!(events.take(), None);
         for attribute in 0..11 {
             let now = Instant::from_nanos(u64::from(attribute));

@@ -1,14 +1,13 @@
 //! Non-volatile memory as an effect: the device offers a record and is told when it is kept.
 //!
-//! Automatic writes carry the *saved* block, never an unsaved setting. A Save is answered when its
-//! own record has been written, after 5 s at the latest.
+//! What is the same on every bus: one record is on its way at a time, writes are counted, one that
+//! failed is tried again after a while, and the crossing reference goes along with each.
 
-use codewheel_devicenet::{NetworkSettings, ProducedPath};
-use codewheel_encoder::{Block, Encoder, Kept, Reference};
+use codewheel_encoder::{Encoder, Kept, Reference, Start};
 use codewheel_station::{Deadline, Duration, Instant};
 
-/// How long a Save waits for the memory.
-pub(crate) const KEEP_TIME: Duration = Duration::from_secs(5);
+use crate::event::{Events, Happening};
+
 /// How long an automatic write waits after one has failed, so that a dying memory is not worn out
 /// (decision).
 const RETRY_TIME: Duration = Duration::from_secs(60);
@@ -22,27 +21,6 @@ pub enum MemoryState {
     Good,
     /// Both records were damaged at a power-up, and nothing has been saved since.
     Damaged,
-}
-
-/// New saved settings on their way into memory.
-#[derive(Clone, Copy, Debug)]
-struct Save {
-    /// What was in force when it was asked for.
-    block: Block,
-    /// Whether the network settings go back to their defaults with it.
-    resets_network: bool,
-    /// Whether its record has been handed out.
-    is_writing: bool,
-}
-
-/// What is on its way into memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Writing {
-    Nothing,
-    /// A record with the saved block as it is.
-    Automatic,
-    /// The record of the Save.
-    Save,
 }
 
 /// Where the shaft stood, in sixteen octets instead of the twenty-four of an `Option<Reference>`.
@@ -72,70 +50,58 @@ impl From<KeptReference> for Option<Reference> {
     }
 }
 
-/// What is kept, what shall be, and what is on its way.
+/// What power-up finds in memory: the record, if there is one of this product.
+pub(crate) fn found<'a, E: Copy + From<Happening>>(
+    now: Instant,
+    start: &'a Start,
+    fingerprint: u16,
+    events: &mut Events<E>,
+) -> (Option<&'a Kept>, MemoryState) {
+    match start {
+        Start::Fresh { interrupted } => {
+            if *interrupted {
+                events.push(now, Happening::FirstWriteInterrupted);
+            }
+            (None, MemoryState::Fresh)
+        }
+        Start::Kept { kept, other_damaged, .. } if kept.fingerprint == fingerprint => {
+            if *other_damaged {
+                events.push(now, Happening::RecordDamaged);
+            }
+            (Some(kept), MemoryState::Good)
+        }
+        Start::Kept { .. } | Start::Damaged => (None, MemoryState::Damaged),
+    }
+}
+
+/// The course of the writes, whatever is written.
 #[derive(Clone, Debug)]
-pub(crate) struct Keeping {
-    /// The saved block, as it is in memory.
-    pub(crate) saved: Block,
+pub(crate) struct Upkeep {
+    /// How often the memory has been written.
+    pub(crate) writes: u32,
+    pub(crate) memory: MemoryState,
+    /// A record is on its way.
+    writing: bool,
+    /// An automatic write is wanted.
+    due: bool,
+    /// Before this no automatic write is tried again.
+    retry_at: Deadline,
     /// The crossing reference, as it is in memory.
     reference: KeptReference,
     /// The crossing reference of the record on its way.
     written_reference: KeptReference,
-    /// A Save whose record is not yet in memory.
-    save: Option<Save>,
-    /// When the Save is answered as failed; never when nobody waits.
-    answer_by: Deadline,
-    /// Before this no automatic write is tried again.
-    retry_at: Deadline,
-    pub(crate) writes: u32,
-    pub(crate) consistency: u16,
-    /// The network settings, as they are in memory.
-    network: NetworkSettings,
-    /// The network settings of the record on its way.
-    written_network: NetworkSettings,
-    /// The network settings, as they shall be.
-    pub(crate) wanted_network: NetworkSettings,
-    pub(crate) memory: MemoryState,
-    writing: Writing,
-    /// An automatic write is wanted.
-    due: bool,
 }
 
-/// What the end of a write means for the one who waits for it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Outcome {
-    /// An automatic write, well or not.
-    Automatic,
-    /// The settings asked for are kept; whether somebody waits to hear it.
-    Saved {
-        /// Whether it is to be answered.
-        answer: bool,
-    },
-    /// They are not.
-    Failed {
-        /// Whether it is to be answered.
-        answer: bool,
-    },
-}
-
-impl Keeping {
-    pub(crate) fn new(saved: Block, kept: Option<&Kept>, memory: MemoryState) -> Self {
-        let bus = kept.map_or_else(Bus::default, |kept| Bus::read(&kept.bus));
+impl Upkeep {
+    pub(crate) fn new(kept: Option<&Kept>, memory: MemoryState) -> Self {
         Self {
-            saved,
+            writes: kept.map_or(0, |kept| kept.writes),
+            memory,
+            writing: false,
+            due: false,
+            retry_at: Deadline::NEVER,
             reference: kept.and_then(|kept| kept.reference).into(),
             written_reference: None.into(),
-            save: None,
-            answer_by: Deadline::NEVER,
-            retry_at: Deadline::NEVER,
-            writes: kept.map_or(0, |kept| kept.writes),
-            consistency: bus.consistency,
-            network: bus.network,
-            written_network: bus.network,
-            wanted_network: bus.network,
-            memory: if bus.damaged { MemoryState::Damaged } else { memory },
-            writing: Writing::Nothing,
-            due: false,
         }
     }
 
@@ -144,236 +110,87 @@ impl Keeping {
         self.reference.into()
     }
 
-    /// Asks for an automatic write with a new crossing reference.
-    pub(crate) const fn refresh(&mut self) {
+    /// The crossing reference, as it is in memory or on its way there.
+    pub(crate) fn coming_reference(&self) -> Option<Reference> {
+        if self.writing { self.written_reference } else { self.reference }.into()
+    }
+
+    /// Asks for an automatic write where the shaft has gone far from the crossing reference.
+    #[inline]
+    pub(crate) fn watch(&mut self, encoder: &Encoder) {
+        if let Some(reference) = self.reference()
+            && !self.writing
+            && encoder.reference_is_stale(&reference)
+        {
+            self.due = true;
+        }
+    }
+
+    /// Asks for an automatic write.
+    pub(crate) const fn ask(&mut self) {
         self.due = true;
     }
 
-    /// Asks for an automatic write of `network`, unless that is what is kept or on its way.
-    pub(crate) fn keep_network(&mut self, network: NetworkSettings) {
-        self.wanted_network = network;
-        let coming = if self.is_writing() { self.written_network } else { self.network };
-        self.due |= network != coming;
-    }
-
-    /// Asks for new saved settings, and for an answer; `false` while the record of an earlier Save
-    /// is on its way.
-    pub(crate) fn save(&mut self, now: Instant, block: Block, resets_network: bool) -> bool {
-        if self.save.is_some_and(|save| save.is_writing) {
-            return false;
-        }
-        self.save = Some(Save { block, resets_network, is_writing: false });
-        self.answer_by = Deadline::at(now + KEEP_TIME);
-        true
-    }
-
     /// Whether a record is on its way into memory.
-    pub(crate) fn is_writing(&self) -> bool {
-        self.writing != Writing::Nothing
+    pub(crate) const fn is_writing(&self) -> bool {
+        self.writing
     }
 
-    /// Whether a record can be handed out at `now`.
-    pub(crate) fn is_due(&self, now: Instant) -> bool {
+    /// Whether a record can be handed out at `now`; an `urgent` one waits for no retry.
+    pub(crate) fn is_due(&self, now: Instant, urgent: bool) -> bool {
         let retry = self.retry_at.is_never() || self.retry_at.is_due(now);
-        !self.is_writing() && (self.save.is_some() || self.due && retry)
+        !self.writing && (urgent || self.due && retry)
     }
 
     /// Whether nothing is to be written, but for an automatic write that has failed.
     pub(crate) fn is_idle(&self) -> bool {
-        let waits_to_retry = self.due && !self.retry_at.is_never();
-        !self.is_writing() && self.save.is_none() && (!self.due || waits_to_retry)
+        !self.writing && (!self.due || !self.retry_at.is_never())
     }
 
-    /// The record to write next. A block that needs a crossing reference gets the one of now.
-    pub(crate) fn next(
-        &mut self,
-        now: Instant,
-        fingerprint: u16,
-        serial: u32,
-        encoder: &Encoder,
-    ) -> Option<Kept> {
-        if !self.is_due(now) {
-            return None;
-        }
+    /// A record is handed out. Returns its crossing reference, where one is `needed`: the one of
+    /// now, or before the first sample the one that is kept.
+    pub(crate) fn begin(&mut self, needed: bool, encoder: &Encoder) -> Option<Reference> {
         self.due = false;
         self.retry_at = Deadline::NEVER;
-        let (saved, network) = match &mut self.save {
-            Some(save) => {
-                save.is_writing = true;
-                self.writing = Writing::Save;
-                let reset = save.resets_network;
-                (save.block, if reset { NetworkSettings::default() } else { self.wanted_network })
-            }
-            None => {
-                self.writing = Writing::Automatic;
-                (self.saved, self.wanted_network)
-            }
-        };
-        let needed = saved.needs_reference(encoder.model());
-        let reference = if needed { encoder.reference() } else { None };
+        self.writing = true;
+        let reference =
+            if needed { encoder.reference().or_else(|| self.reference()) } else { None };
         self.written_reference = reference.into();
-        self.written_network = network;
-        let bus = Bus {
-            network,
-            consistency: self.consistency_of(&saved),
-            // Only a Save ends the mark that both records were damaged once.
-            damaged: self.memory == MemoryState::Damaged && self.writing == Writing::Automatic,
-        };
-        let writes = self.writes.saturating_add(1);
-        Some(Kept { fingerprint, saved, reference, serial, writes, bus: bus.write() })
+        reference
     }
 
-    /// The configuration consistency value with `saved` and the network settings on their way:
-    /// another one when kept settings change.
-    fn consistency_of(&self, saved: &Block) -> u16 {
-        let changed = *saved != self.saved || self.written_network != self.network;
-        if changed { self.consistency.wrapping_add(1) } else { self.consistency }
-    }
-
-    /// The write handed out last has ended.
-    pub(crate) fn kept(&mut self, now: Instant, good: bool) -> Outcome {
-        let writing = core::mem::replace(&mut self.writing, Writing::Nothing);
-        let save = match writing {
-            Writing::Nothing => return Outcome::Automatic,
-            Writing::Automatic => None,
-            Writing::Save => self.save.take(),
-        };
-        if good {
-            let saved = save.map_or(self.saved, |save| save.block);
-            self.consistency = self.consistency_of(&saved);
-            self.saved = saved;
+    /// The record handed out last has been written, or not; `false` where there was none. After a
+    /// failure the caller says with [`retry`](Self::retry) whether it is to be tried again.
+    pub(crate) fn end(&mut self, good: bool) -> bool {
+        let was_writing = core::mem::replace(&mut self.writing, false);
+        if was_writing && good {
             self.reference = self.written_reference;
-            self.network = self.written_network;
             self.writes = self.writes.saturating_add(1);
-            if self.memory == MemoryState::Fresh || save.is_some() {
-                self.memory = MemoryState::Good;
-            }
-            if save.is_some_and(|save| save.resets_network) {
-                self.wanted_network = self.network;
-            }
-        } else if save.is_none() || self.wanted_network != self.network {
-            // What was to be kept at once still is.
-            self.due = true;
-            self.retry_at = Deadline::at(now + RETRY_TIME);
         }
-        if save.is_none() {
-            return Outcome::Automatic;
-        }
-        // A Save that was answered as failed, because it took too long, is not answered again.
-        let answer = !self.answer_by.is_never();
-        self.answer_by = Deadline::NEVER;
-        if good { Outcome::Saved { answer } } else { Outcome::Failed { answer } }
+        was_writing
     }
 
-    /// The power was cycled: nobody waits any more, and a Save whose record has not been fetched is
-    /// gone like every other setting that was not kept.
-    pub(crate) fn power_cycled(&mut self) {
-        self.answer_by = Deadline::NEVER;
-        if self.writing != Writing::Save {
-            self.save = None;
-        }
+    /// Asks for an automatic write, but not at once: one has failed at `now`.
+    pub(crate) fn retry(&mut self, now: Instant) {
+        self.due = true;
+        self.retry_at = Deadline::at(now + RETRY_TIME);
     }
 
-    /// Whether the newest Save has waited for too long; then it is to be answered as failed, and is
-    /// off where its record has not even been fetched.
-    pub(crate) fn overdue(&mut self, now: Instant) -> bool {
-        // From here on the record waits to be fetched, like any other.
+    /// Wants nothing to be written any more.
+    pub(crate) const fn forget(&mut self) {
+        self.due = false;
+        self.retry_at = Deadline::NEVER;
+    }
+
+    /// From here on a record that was to be tried again waits to be fetched, like any other.
+    #[inline]
+    pub(crate) fn advance(&mut self, now: Instant) {
         self.retry_at.take_due(now);
-        let overdue = self.answer_by.take_due(now);
-        if overdue && self.writing != Writing::Save {
-            self.save = None;
-        }
-        overdue
     }
 
+    /// When [`advance`](Self::advance) is due.
+    #[inline]
     pub(crate) fn deadline(&self) -> Deadline {
-        let retry = if self.due { self.retry_at } else { Deadline::NEVER };
-        self.answer_by.min(retry)
-    }
-}
-
-/// The octets of the record that belong to the bus.
-///
-/// | octet | content |
-/// |---|---|
-/// | 0 | version, 1 |
-/// | 1 | bit 0 bus-off interrupt, bit 1 both records were damaged and nothing has been saved since |
-/// | 2 … 3 | configuration consistency value |
-/// | 4 … 5 | poll connection: assembly, whether its path names the attribute |
-/// | 6 … 7 | change of state connection: the same |
-/// | 8 | heartbeat interval in seconds |
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Bus {
-    network: NetworkSettings,
-    consistency: u16,
-    damaged: bool,
-}
-
-const BUS_VERSION: u8 = 1;
-const BUS_OFF_INTERRUPT: u8 = 1 << 0;
-const DAMAGED: u8 = 1 << 1;
-
-impl Bus {
-    fn write(self) -> [u8; 24] {
-        let Self { network, consistency, damaged } = self;
-        let NetworkSettings { bus_off_interrupt, heartbeat_interval, poll_path, change_path } =
-            network;
-        let interrupt = if bus_off_interrupt { BUS_OFF_INTERRUPT } else { 0 };
-        let [low, high] = consistency.to_le_bytes();
-        let content = [
-            BUS_VERSION,
-            interrupt | if damaged { DAMAGED } else { 0 },
-            low,
-            high,
-            poll_path.assembly,
-            u8::from(poll_path.names_attribute),
-            change_path.assembly,
-            u8::from(change_path.names_attribute),
-            heartbeat_interval,
-        ];
-        let mut octets = [0; 24];
-        for (to, from) in octets.iter_mut().zip(content) {
-            *to = from;
-        }
-        octets
-    }
-
-    fn read(octets: &[u8; 24]) -> Self {
-        let [version, flags, low, high, poll, poll_long, change, change_long, heartbeat, ..] =
-            *octets;
-        if version != BUS_VERSION {
-            return Self::default();
-        }
-        let path = |assembly, long| ProducedPath { assembly, names_attribute: long != 0 };
-        Self {
-            network: NetworkSettings {
-                bus_off_interrupt: flags & BUS_OFF_INTERRUPT != 0,
-                heartbeat_interval: heartbeat,
-                poll_path: path(poll, poll_long),
-                change_path: path(change, change_long),
-            },
-            consistency: u16::from_le_bytes([low, high]),
-            damaged: flags & DAMAGED != 0,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_octets_of_the_bus_read_back_as_written() {
-        let network = NetworkSettings {
-            bus_off_interrupt: true,
-            heartbeat_interval: 200,
-            poll_path: ProducedPath { assembly: 2, names_attribute: true },
-            change_path: ProducedPath { assembly: 1, names_attribute: true },
-        };
-        for damaged in [false, true] {
-            let bus = Bus { network, consistency: 0xBEEF, damaged };
-            assert_eq!(Bus::read(&bus.write()), bus);
-        }
-        assert_eq!(Bus::read(&[0; 24]), Bus::default());
+        if self.due { self.retry_at } else { Deadline::NEVER }
     }
 }

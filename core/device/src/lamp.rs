@@ -1,4 +1,5 @@
-//! The bicolour lamp in the bus cover: combined module and network status (AMG manual §9.2).
+//! The bicolour lamp in the bus cover: combined module and network status (AMG manual §9.2; PROFIBUS
+//! manual §9.5).
 
 use core::fmt;
 
@@ -12,11 +13,15 @@ pub enum Lamp {
     Off,
     /// On-line, no connection.
     GreenFlashing,
-    /// A connection is established.
+    /// A connection is established. On PROFIBUS: data is exchanged.
     Green,
-    /// An I/O connection has timed out.
+    /// On PROFIBUS: the slave is on its way to the exchange of data.
+    Yellow,
+    /// An I/O connection has timed out. On PROFIBUS: a parameterization error.
     RedFlashing,
-    /// Critical: duplicate MAC ID, bus-off, illegal switches.
+    /// On PROFIBUS, five times a second: a preset out of range.
+    RedFlashingFast,
+    /// Critical: duplicate MAC ID, bus-off, illegal switches. On PROFIBUS: a position error.
     Red,
     /// The self test at power-on: green, then red, for a quarter of a second each.
     SelfTest,
@@ -29,14 +34,27 @@ pub enum Colour {
     Dark,
     /// Green light.
     Green,
+    /// Yellow light: green and red at once.
+    Yellow,
     /// Red light.
     Red,
+}
+
+/// What the lamp of a slave depends on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SlaveStatus {
+    pub(crate) preset_out_of_range: bool,
+    pub(crate) position_error: bool,
+    pub(crate) parameterization_error: bool,
+    pub(crate) exchanges_data: bool,
 }
 
 /// How long each colour of the self test shines.
 const SELF_TEST: Duration = Duration::from_millis(250);
 /// How long a flashing lamp is on, and then off.
 const HALF_PERIOD: u64 = Duration::from_millis(500).as_nanos();
+/// The same for five times a second.
+const FAST_HALF_PERIOD: u64 = Duration::from_millis(100).as_nanos();
 
 impl Lamp {
     /// The lamp `since` after power-up, with the network as it is.
@@ -54,17 +72,31 @@ impl Lamp {
         }
     }
 
+    /// The lamp of a PROFIBUS slave. Decision: what needs a person most comes first.
+    pub(crate) const fn of_slave(status: SlaveStatus) -> Self {
+        match status {
+            SlaveStatus { preset_out_of_range: true, .. } => Self::RedFlashingFast,
+            SlaveStatus { position_error: true, .. } => Self::Red,
+            SlaveStatus { parameterization_error: true, .. } => Self::RedFlashing,
+            SlaveStatus { exchanges_data: true, .. } => Self::Green,
+            SlaveStatus { exchanges_data: false, .. } => Self::Yellow,
+        }
+    }
+
     /// The colour `since` after power-up.
     #[must_use]
     pub fn colour(self, since: Duration) -> Colour {
-        let lit = (since.as_nanos() / HALF_PERIOD).is_multiple_of(2);
+        let half_period =
+            if self == Self::RedFlashingFast { FAST_HALF_PERIOD } else { HALF_PERIOD };
+        let lit = (since.as_nanos() / half_period).is_multiple_of(2);
         match self {
             Self::Off => Colour::Dark,
             Self::Green => Colour::Green,
+            Self::Yellow => Colour::Yellow,
             Self::Red => Colour::Red,
             Self::GreenFlashing if lit => Colour::Green,
-            Self::RedFlashing if lit => Colour::Red,
-            Self::GreenFlashing | Self::RedFlashing => Colour::Dark,
+            Self::RedFlashing | Self::RedFlashingFast if lit => Colour::Red,
+            Self::GreenFlashing | Self::RedFlashing | Self::RedFlashingFast => Colour::Dark,
             Self::SelfTest if since < SELF_TEST => Colour::Green,
             Self::SelfTest => Colour::Red,
         }
@@ -77,7 +109,9 @@ impl fmt::Display for Lamp {
             Self::Off => "off",
             Self::GreenFlashing => "green flashing",
             Self::Green => "green",
+            Self::Yellow => "yellow",
             Self::RedFlashing => "red flashing",
+            Self::RedFlashingFast => "red flashing fast",
             Self::Red => "red",
             Self::SelfTest => "self test",
         })
@@ -119,6 +153,38 @@ mod tests {
             assert_eq!(at(network, 3_500), Colour::Dark);
             assert_eq!(at(network, 3_999), Colour::Dark);
             assert_eq!(at(network, 4_000), colour);
+        }
+    }
+
+    #[test]
+    fn a_preset_out_of_range_flashes_five_times_a_second() {
+        let at = |millis| Lamp::RedFlashingFast.colour(Duration::from_millis(millis));
+        assert_eq!(
+            [at(0), at(99), at(100), at(199)].map(|colour| colour == Colour::Red),
+            [true, true, false, false]
+        );
+        let flashes = (0..1_000).filter(|millis| at(*millis) != at(millis + 1)).count();
+        assert_eq!(flashes, 10, "five times on and off in a second");
+    }
+
+    /// Decision: 5 Hz > red > 1 Hz > yellow or green.
+    #[test]
+    fn of_several_troubles_of_a_slave_the_lamp_shows_the_one_that_needs_a_person_most() {
+        for bits in 0..16 {
+            let status = SlaveStatus {
+                preset_out_of_range: bits & 8 != 0,
+                position_error: bits & 4 != 0,
+                parameterization_error: bits & 2 != 0,
+                exchanges_data: bits & 1 != 0,
+            };
+            let expected = match bits {
+                8.. => Lamp::RedFlashingFast,
+                4.. => Lamp::Red,
+                2.. => Lamp::RedFlashing,
+                1 => Lamp::Green,
+                _ => Lamp::Yellow,
+            };
+            assert_eq!(Lamp::of_slave(status), expected, "{status:?}");
         }
     }
 }

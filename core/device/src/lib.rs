@@ -1,8 +1,8 @@
 //! The encoder products: catalogue, attribute rows, lamp, switches, non-volatile memory — the
 //! encoder dressed for its bus.
 //!
-//! [`DeviceNetEncoder`] is a complete device: hand it frames and time, a [`Sensor`], and a place
-//! for its records.
+//! [`DeviceNetEncoder`] and [`ProfibusEncoder`] are complete devices: hand them frames or octets and
+//! time, a [`Sensor`], and a place for their records.
 //!
 //! # Panics
 //! Nothing a peer can send makes this crate panic. A panic is a bug.
@@ -19,9 +19,11 @@ extern crate std;
 
 pub mod devicenet;
 mod event;
+mod instrument;
 mod keeping;
 mod lamp;
 pub mod product;
+pub mod profibus;
 mod snapshot;
 mod switches;
 
@@ -30,5 +32,6 @@ pub use event::Event;
 pub use keeping::MemoryState;
 pub use lamp::{Colour, Lamp};
 pub use product::Product;
-pub use snapshot::Snapshot;
+pub use profibus::ProfibusEncoder;
+pub use snapshot::{DeviceNetState, Network, ProfibusState, Snapshot};
 pub use switches::Switches;

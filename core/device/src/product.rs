@@ -1,4 +1,5 @@
-//! The catalogue: which products there are and what sets them apart (AMG manual §1.2).
+//! The catalogue: which products there are and what sets them apart (DeviceNet manual §1.2,
+//! PROFIBUS manual §1.2).
 
 use core::fmt;
 
@@ -17,13 +18,58 @@ pub enum Family {
     Hmg11,
     /// HMG 10, hollow shaft.
     Hmg10,
+    /// HEAG 162, a converter: an encoder with SSI takes the place of the shaft.
+    Heag162,
+}
+
+/// The shaft of a family.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Shaft {
+    /// It fits into the machine.
+    Solid,
+    /// The shaft of the machine fits into it.
+    Hollow,
+    /// There is none: the product reads an encoder by SSI.
+    None,
+}
+
+/// A field bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Bus {
+    /// DeviceNet.
+    DeviceNet,
+    /// PROFIBUS-DP.
+    Profibus,
+}
+
+impl fmt::Display for Bus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::DeviceNet => "DeviceNet",
+            Self::Profibus => "PROFIBUS",
+        })
+    }
+}
+
+impl fmt::Display for Shaft {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Solid => "solid",
+            Self::Hollow => "hollow",
+            Self::None => "none (SSI)",
+        })
+    }
 }
 
 impl Family {
-    /// Whether the shaft is hollow.
+    /// What shaft it has.
     #[must_use]
-    pub const fn has_hollow_shaft(self) -> bool {
-        matches!(self, Self::Hmg11 | Self::Hmg10)
+    pub const fn shaft(self) -> Shaft {
+        match self {
+            Self::Amg11 | Self::Amg81 | Self::Pmg10 => Shaft::Solid,
+            Self::Hmg11 | Self::Hmg10 => Shaft::Hollow,
+            Self::Heag162 => Shaft::None,
+        }
     }
 }
 
@@ -34,12 +80,14 @@ pub struct Product {
     pub model: &'static str,
     /// The name in the manual, `AMG 11 D29`.
     pub title: &'static str,
-    /// Identity attribute 7, the manual's product family: `AMG 11 - Multiturn`.
+    /// The manual's product family: `AMG 11 - Multiturn`; on DeviceNet identity attribute 7.
     pub product_name: &'static str,
-    /// The name of its EDS file, as the manual prints it.
-    pub eds_file: &'static str,
+    /// The name of its EDS or GSD file, as the manual prints it.
+    pub data_sheet: &'static str,
     /// The family.
     pub family: Family,
+    /// The bus it speaks.
+    pub bus: Bus,
     /// What the encoder itself needs to know.
     pub encoder: Model,
     /// Names the product in a kept record; never reused for another.
@@ -55,10 +103,15 @@ impl Product {
     /// The product with this name; upper and lower case are the same.
     #[must_use]
     pub fn find(model: &str) -> Option<&'static Self> {
-        DEVICENET.iter().find(|product| product.model.eq_ignore_ascii_case(model))
+        Self::all().find(|product| product.model.eq_ignore_ascii_case(model))
     }
 
-    /// Identity attribute 3: 0Ah multiturn, 0Bh singleturn.
+    /// The whole catalogue: [`DEVICENET`], then [`PROFIBUS`].
+    pub fn all() -> impl Iterator<Item = &'static Self> {
+        DEVICENET.iter().chain(&PROFIBUS)
+    }
+
+    /// DeviceNet identity attribute 3: 0Ah multiturn, 0Bh singleturn.
     #[must_use]
     pub const fn product_code(&self) -> u16 {
         if self.encoder.geometry.is_multiturn() {
@@ -97,14 +150,20 @@ const fn multiturn(lithium_cell: bool) -> Model {
     Model { geometry: Geometry::MULTITURN_29, lithium_cell, total_follows_steps: false }
 }
 
+/// On PROFIBUS a singleturn encoder has a measuring range of its own (PROFIBUS manual §4).
+const fn profibus(geometry: Geometry, lithium_cell: bool) -> Model {
+    Model { geometry, lithium_cell, total_follows_steps: false }
+}
+
 /// The ten DeviceNet products, in the manual's order.
 pub static DEVICENET: [Product; 10] = [
     Product {
         model: "amg11-d13",
         title: "AMG 11 D13",
         product_name: "AMG 11 - Singleturn",
-        eds_file: "AMG11D13.eds",
+        data_sheet: "AMG11D13.eds",
         family: Family::Amg11,
+        bus: Bus::DeviceNet,
         encoder: singleturn(),
         fingerprint: 1,
     },
@@ -112,8 +171,9 @@ pub static DEVICENET: [Product; 10] = [
         model: "amg11-d29",
         title: "AMG 11 D29",
         product_name: "AMG 11 - Multiturn",
-        eds_file: "AMG11D29.eds",
+        data_sheet: "AMG11D29.eds",
         family: Family::Amg11,
+        bus: Bus::DeviceNet,
         encoder: multiturn(false),
         fingerprint: 2,
     },
@@ -121,8 +181,9 @@ pub static DEVICENET: [Product; 10] = [
         model: "amg81-d13",
         title: "AMG 81 D13",
         product_name: "AMG 81 - Singleturn",
-        eds_file: "AMG81D13.eds",
+        data_sheet: "AMG81D13.eds",
         family: Family::Amg81,
+        bus: Bus::DeviceNet,
         encoder: singleturn(),
         fingerprint: 3,
     },
@@ -130,8 +191,9 @@ pub static DEVICENET: [Product; 10] = [
         model: "amg81-d29",
         title: "AMG 81 D29",
         product_name: "AMG 81 - Multiturn",
-        eds_file: "AMG81D29.eds",
+        data_sheet: "AMG81D29.eds",
         family: Family::Amg81,
+        bus: Bus::DeviceNet,
         // By analogy with the AMG 81 P 29 of the PROFIBUS manual (decision).
         encoder: multiturn(true),
         fingerprint: 4,
@@ -140,8 +202,9 @@ pub static DEVICENET: [Product; 10] = [
         model: "pmg10-d13",
         title: "PMG10…DN.3000",
         product_name: "PMG 10 - Singleturn",
-        eds_file: "PMG10D13.eds",
+        data_sheet: "PMG10D13.eds",
         family: Family::Pmg10,
+        bus: Bus::DeviceNet,
         encoder: singleturn(),
         fingerprint: 5,
     },
@@ -149,8 +212,9 @@ pub static DEVICENET: [Product; 10] = [
         model: "pmg10-d29",
         title: "PMG10…DN.3600",
         product_name: "PMG 10 - Multiturn",
-        eds_file: "PMG10D29.eds",
+        data_sheet: "PMG10D29.eds",
         family: Family::Pmg10,
+        bus: Bus::DeviceNet,
         encoder: multiturn(false),
         fingerprint: 6,
     },
@@ -158,8 +222,9 @@ pub static DEVICENET: [Product; 10] = [
         model: "hmg11-d13",
         title: "HMG 11 D13",
         product_name: "HMG 11 - Singleturn",
-        eds_file: "HMG11D13.eds",
+        data_sheet: "HMG11D13.eds",
         family: Family::Hmg11,
+        bus: Bus::DeviceNet,
         encoder: singleturn(),
         fingerprint: 7,
     },
@@ -167,8 +232,9 @@ pub static DEVICENET: [Product; 10] = [
         model: "hmg11-d29",
         title: "HMG 11 D29",
         product_name: "HMG 11 - Multiturn",
-        eds_file: "HMG11D29.eds",
+        data_sheet: "HMG11D29.eds",
         family: Family::Hmg11,
+        bus: Bus::DeviceNet,
         encoder: multiturn(false),
         fingerprint: 8,
     },
@@ -176,8 +242,9 @@ pub static DEVICENET: [Product; 10] = [
         model: "hmg10-d13",
         title: "HMG10…DN.3000",
         product_name: "HMG 10 - Singleturn",
-        eds_file: "HMG10D13.eds",
+        data_sheet: "HMG10D13.eds",
         family: Family::Hmg10,
+        bus: Bus::DeviceNet,
         encoder: singleturn(),
         fingerprint: 9,
     },
@@ -185,30 +252,171 @@ pub static DEVICENET: [Product; 10] = [
         model: "hmg10-d29",
         title: "HMG10…DN.3600",
         product_name: "HMG 10 - Multiturn",
-        eds_file: "HMG10D29.eds",
+        data_sheet: "HMG10D29.eds",
         family: Family::Hmg10,
+        bus: Bus::DeviceNet,
         encoder: multiturn(false),
         fingerprint: 10,
+    },
+];
+
+/// The ten PROFIBUS encoders and the three HEAG 162 converters, in the manual's order.
+pub static PROFIBUS: [Product; 13] = [
+    Product {
+        model: "amg11-p13",
+        title: "AMG 11 P 13",
+        product_name: "AMG 11 - Singleturn 13 bit",
+        data_sheet: "PB13DPV0.GSD",
+        family: Family::Amg11,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::SINGLETURN_13, false),
+        fingerprint: 11,
+    },
+    Product {
+        model: "amg11-p29",
+        title: "AMG 11 P 29",
+        product_name: "AMG 11 - Multiturn 29 bit",
+        data_sheet: "PB29DPV0.GSD",
+        family: Family::Amg11,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::MULTITURN_29, false),
+        fingerprint: 12,
+    },
+    Product {
+        model: "amg81-p13",
+        title: "AMG 81 P 13",
+        product_name: "AMG 81 - Singleturn 13 bit",
+        data_sheet: "PB13DPV0.GSD",
+        family: Family::Amg81,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::SINGLETURN_13, false),
+        fingerprint: 13,
+    },
+    Product {
+        model: "amg81-p29",
+        title: "AMG 81 P 29",
+        product_name: "AMG 81 - Multiturn 29 bit",
+        data_sheet: "PB29DPV0.GSD",
+        family: Family::Amg81,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::MULTITURN_29, true),
+        fingerprint: 14,
+    },
+    Product {
+        model: "pmg10-p13",
+        title: "PMG10…P0.3000",
+        product_name: "PMG 10 - Singleturn 13 bit",
+        data_sheet: "PB13DPV0.GSD",
+        family: Family::Pmg10,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::SINGLETURN_13, false),
+        fingerprint: 15,
+    },
+    Product {
+        model: "pmg10-p29",
+        title: "PMG10…P0.3600",
+        product_name: "PMG 10 - Multiturn 29 bit",
+        data_sheet: "PB29DPV0.GSD",
+        family: Family::Pmg10,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::MULTITURN_29, false),
+        fingerprint: 16,
+    },
+    Product {
+        model: "hmg11-p13",
+        title: "HMG 11 P 13",
+        product_name: "HMG 11 - Singleturn 13 bit",
+        data_sheet: "PB13DPV0.GSD",
+        family: Family::Hmg11,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::SINGLETURN_13, false),
+        fingerprint: 17,
+    },
+    Product {
+        model: "hmg11-p29",
+        title: "HMG 11 P 29",
+        product_name: "HMG 11 - Multiturn 29 bit",
+        data_sheet: "PB29DPV0.GSD",
+        family: Family::Hmg11,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::MULTITURN_29, false),
+        fingerprint: 18,
+    },
+    Product {
+        model: "hmg10-p13",
+        title: "HMG10….3000",
+        product_name: "HMG 10 - Singleturn 13 bit",
+        data_sheet: "PB13DPV0.GSD",
+        family: Family::Hmg10,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::SINGLETURN_13, false),
+        fingerprint: 19,
+    },
+    Product {
+        model: "hmg10-p29",
+        title: "HMG10….3600",
+        product_name: "HMG 10 - Multiturn 29 bit",
+        data_sheet: "PB29DPV0.GSD",
+        family: Family::Hmg10,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::MULTITURN_29, false),
+        fingerprint: 20,
+    },
+    Product {
+        model: "heag162-p13",
+        title: "HEAG 162 SP 13",
+        product_name: "HEAG 162 converter 13 bit",
+        data_sheet: "PB13DPV0.GSD",
+        family: Family::Heag162,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::SINGLETURN_13, false),
+        fingerprint: 21,
+    },
+    Product {
+        model: "heag162-p18",
+        title: "HEAG 162 SP 18",
+        product_name: "HEAG 162 converter 18 bit",
+        data_sheet: "PB18DPV0.GSD",
+        family: Family::Heag162,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::SINGLETURN_18, false),
+        fingerprint: 22,
+    },
+    Product {
+        model: "heag162-p29",
+        title: "HEAG 162 SP 29",
+        product_name: "HEAG 162 converter 29 bit",
+        data_sheet: "PB29DPV0.GSD",
+        family: Family::Heag162,
+        bus: Bus::Profibus,
+        encoder: profibus(Geometry::MULTITURN_29, false),
+        fingerprint: 23,
     },
 ];
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn every_product_has_a_name_and_a_fingerprint_of_its_own() {
-        for (place, product) in DEVICENET.iter().enumerate() {
-            for other in &DEVICENET[place + 1..] {
+        for (place, product) in Product::all().enumerate() {
+            for other in Product::all().skip(place + 1) {
                 assert_ne!(product.model, other.model);
+                assert_ne!(product.title, other.title);
                 assert_ne!(product.fingerprint, other.fingerprint);
-                assert_ne!(product.eds_file, other.eds_file);
+                // A GSD file is for a geometry, an EDS file for a product.
+                if product.bus == Bus::DeviceNet {
+                    assert_ne!(product.data_sheet, other.data_sheet);
+                }
             }
             assert!(product.product_name.len() <= 32, "a SHORT_STRING of the Identity object");
         }
+        assert_eq!(Product::all().count(), 23);
     }
 
-    /// AMG manual §1.2, both tables.
+    /// DeviceNet manual §1.2, both tables.
     #[test]
     fn names_and_files_are_those_the_manual_prints() {
         let printed = [
@@ -223,9 +431,9 @@ mod tests {
             ("HMG10…DN.3000", "HMG10D13.eds", "HMG 10 - Singleturn"),
             ("HMG10…DN.3600", "HMG10D29.eds", "HMG 10 - Multiturn"),
         ];
-        for (product, (title, eds_file, product_name)) in DEVICENET.iter().zip(printed) {
+        for (product, (title, data_sheet, product_name)) in DEVICENET.iter().zip(printed) {
             assert_eq!(product.title, title);
-            assert_eq!(product.eds_file, eds_file);
+            assert_eq!(product.data_sheet, data_sheet);
             assert_eq!(product.product_name, product_name);
         }
     }
@@ -234,7 +442,11 @@ mod tests {
     fn names_are_found_in_any_case_and_only_whole() {
         assert_eq!(Product::find("AMG11-D29").map(|product| product.title), Some("AMG 11 D29"));
         assert_eq!(Product::find("amg11"), None);
-        assert_eq!(Product::find("amg11-p29"), None);
+        assert_eq!(
+            Product::find("HEAG162-P18").map(|product| product.title),
+            Some("HEAG 162 SP 18")
+        );
+        assert_eq!(Product::find("heag162-d18"), None);
     }
 
     #[test]
@@ -244,6 +456,33 @@ mod tests {
             let (code, kind) = if multiturn { (0x0A, 2) } else { (0x0B, 1) };
             assert_eq!((product.product_code(), product.encoder_type()), (code, kind));
             assert_eq!(product.encoder.lithium_cell, product.model == "amg81-d29");
+        }
+    }
+
+    /// PROFIBUS manual §1.2, all three tables, and §7.2 for the cell.
+    #[test]
+    fn the_profibus_products_have_the_files_of_the_manual_and_one_of_them_a_cell() {
+        let printed = [
+            ("AMG 11 P 13", "PB13DPV0.GSD"),
+            ("AMG 11 P 29", "PB29DPV0.GSD"),
+            ("AMG 81 P 13", "PB13DPV0.GSD"),
+            ("AMG 81 P 29", "PB29DPV0.GSD"),
+            ("PMG10…P0.3000", "PB13DPV0.GSD"),
+            ("PMG10…P0.3600", "PB29DPV0.GSD"),
+            ("HMG 11 P 13", "PB13DPV0.GSD"),
+            ("HMG 11 P 29", "PB29DPV0.GSD"),
+            ("HMG10….3000", "PB13DPV0.GSD"),
+            ("HMG10….3600", "PB29DPV0.GSD"),
+            ("HEAG 162 SP 13", "PB13DPV0.GSD"),
+            ("HEAG 162 SP 18", "PB18DPV0.GSD"),
+            ("HEAG 162 SP 29", "PB29DPV0.GSD"),
+        ];
+        for (product, (title, data_sheet)) in PROFIBUS.iter().zip(printed) {
+            assert_eq!((product.title, product.data_sheet), (title, data_sheet));
+            assert_eq!(product.bus, Bus::Profibus);
+            assert_eq!(product.encoder.lithium_cell, product.model == "amg81-p29");
+            let bits = product.encoder.geometry.range().trailing_zeros().to_string();
+            assert!(product.model.ends_with(&bits) && data_sheet.contains(&bits));
         }
     }
 }

@@ -6,17 +6,16 @@ use codewheel_devicenet::{
     SwitchPositions,
 };
 use codewheel_encoder::{Block, Encoder, Sensor, Settings, Start};
-use codewheel_station::{Deadline, Duration, Instant, Writer};
+use codewheel_station::{Deadline, Instant, Writer};
 
 use super::Factory;
+use super::keeping::Keeping;
 use super::parameter::{self, PARAMETER};
 use super::rows::{ENCODER_POSITION, PRESET, Row, View};
-use crate::event::{Event, Events};
-use crate::keeping::{Keeping, MemoryState};
+use crate::event::{DeviceNetEvent, Events, Happening};
+use crate::instrument::Instrument;
+use crate::keeping::{self, MemoryState};
 use crate::{Product, Switches};
-
-/// How often a moving shaft is looked at between productions.
-const SAMPLE_TIME: Duration = Duration::from_millis(1);
 
 /// Identity attribute 5: bit 2, configured; bit 8, minor recoverable fault.
 const CONFIGURED: u16 = 1 << 2;
@@ -28,18 +27,12 @@ const WARNING_FLAG: u8 = 1 << 1;
 
 #[derive(Clone, Debug)]
 pub(super) struct Body<S> {
-    pub(super) product: &'static Product,
+    pub(super) instrument: Instrument<S, DeviceNetEvent>,
     pub(super) factory: Factory,
     pub(super) switches: Switches,
     /// The address in force, as the switches gave it at power-up.
     pub(super) mac: Option<MacId>,
-    pub(super) sensor: S,
-    pub(super) encoder: Encoder,
     pub(super) keeping: Keeping,
-    pub(super) events: Events,
-    pub(super) powered_at: Instant,
-    /// When the shaft must be looked at; never while it rests.
-    pub(super) next_sample: Deadline,
     /// When a reset that waits for the memory happens all the same.
     pub(super) restart_by: Deadline,
     /// The unwrapped position that the change of state connection produced last.
@@ -62,42 +55,23 @@ impl<S: Sensor> Body<S> {
         let model = product.encoder;
         let defaults = Block::default_for(model);
         let mut events = Events::new();
-        let mut keeping = match memory {
-            Start::Fresh { interrupted } => {
-                if *interrupted {
-                    events.push(now, Event::FirstWriteInterrupted);
-                }
-                Keeping::new(defaults, None, MemoryState::Fresh)
-            }
-            Start::Kept { kept, other_damaged, .. } if kept.fingerprint == product.fingerprint => {
-                if *other_damaged {
-                    events.push(now, Event::RecordDamaged);
-                }
-                Keeping::new(kept.saved, Some(kept), MemoryState::Good)
-            }
-            Start::Kept { .. } | Start::Damaged => {
-                Keeping::new(defaults, None, MemoryState::Damaged)
-            }
-        };
+        let (kept, state) = keeping::found(now, memory, product.fingerprint, &mut events);
+        let saved = kept.map_or(defaults, |kept| kept.saved);
+        let mut keeping = Keeping::new(saved, kept, state);
         let encoder =
-            Encoder::power_up(model, keeping.saved, keeping.reference()).unwrap_or_else(|_| {
+            Encoder::power_up(model, saved, keeping.upkeep.reference()).unwrap_or_else(|_| {
                 keeping = Keeping::new(defaults, None, MemoryState::Damaged);
                 Encoder::with_defaults(model)
             });
-        if keeping.memory == MemoryState::Damaged {
-            events.push(now, Event::MemoryDamaged);
+        if keeping.upkeep.memory == MemoryState::Damaged {
+            events.push(now, Happening::MemoryDamaged);
         }
         let mut body = Self {
-            product,
+            instrument: Instrument::new(now, product, sensor, encoder, events),
             factory,
             switches,
             mac: switches.mac(),
-            sensor,
-            encoder,
             keeping,
-            events,
-            powered_at: now,
-            next_sample: Deadline::NEVER,
             restart_by: Deadline::NEVER,
             produced: 0,
             produced_flags: 0,
@@ -109,21 +83,22 @@ impl<S: Sensor> Body<S> {
 
     /// What every power-up does: read the switches, look at the shaft.
     fn wake(&mut self, now: Instant) {
-        self.powered_at = now;
         self.restart_by = Deadline::NEVER;
         self.mac = self.switches.mac();
-        self.events.push(now, Event::PowerUp);
+        self.tell(now, Happening::PowerUp);
         if self.mac.is_none() {
-            self.events.push(now, Event::IllegalAddress { switches: self.switches.address() });
+            self.tell(now, DeviceNetEvent::IllegalAddress { switches: self.switches.address() });
         }
         self.sample(now);
     }
 
     /// The power is cycled: what is kept is in force again.
     pub(super) fn restart(&mut self, now: Instant) {
-        let model = self.product.encoder;
-        self.encoder = Encoder::power_up(model, self.keeping.saved, self.keeping.reference())
+        let model = self.product().encoder;
+        let reference = self.keeping.upkeep.reference();
+        let encoder = Encoder::power_up(model, self.keeping.saved, reference)
             .unwrap_or_else(|_| Encoder::with_defaults(model));
+        self.instrument.restart(now, encoder);
         self.keeping.power_cycled();
         self.produce_anyway = true;
         self.wake(now);
@@ -138,78 +113,50 @@ impl<S: Sensor> Body<S> {
         }
     }
 
-    /// Looks at the shaft.
-    fn sample(&mut self, now: Instant) {
-        let (alarm, warning) = (self.encoder.alarm(), self.encoder.warning());
-        let sample = self.sensor.sample(now);
-        self.encoder.sample(now, sample);
-        let changes_at = self.sensor.changes_at(now);
-        self.next_sample =
-            changes_at.map_or(Deadline::NEVER, |at| Deadline::at(at.max(now + SAMPLE_TIME)));
-        if (alarm, warning) != (self.encoder.alarm(), self.encoder.warning()) {
-            self.flags_changed(now, alarm, warning);
-        }
-        if let Some(reference) = self.keeping.reference()
-            && !self.keeping.is_writing()
-            && self.encoder.reference_is_stale(&reference)
-        {
-            self.keeping.refresh();
-        }
+    pub(super) const fn product(&self) -> &'static Product {
+        self.instrument.product
     }
 
-    fn flags_changed(&mut self, now: Instant, alarm: bool, warning: bool) {
-        match (alarm, self.encoder.alarm()) {
-            (false, true) => self.events.push(now, Event::PositionError),
-            (true, false) => self.events.push(now, Event::PositionErrorEnded),
-            _ => {}
-        }
-        match (warning, self.encoder.warning()) {
-            (false, true) => self.events.push(now, Event::CellLow),
-            (true, false) => self.events.push(now, Event::CellRight),
-            _ => {}
-        }
+    pub(super) const fn encoder(&self) -> &Encoder {
+        &self.instrument.encoder
+    }
+
+    pub(super) fn tell(&mut self, now: Instant, event: impl Into<DeviceNetEvent>) {
+        self.instrument.events.push(now, event);
+    }
+
+    /// Looks at the shaft.
+    fn sample(&mut self, now: Instant) {
+        self.instrument.sample(now);
+        self.keeping.upkeep.watch(&self.instrument.encoder);
     }
 
     /// Runs what fell due; whether a pending Save has failed.
     pub(super) fn advance(&mut self, now: Instant) -> bool {
-        if self.next_sample.is_due(now) {
+        if self.instrument.next_sample.is_due(now) {
             self.sample(now);
         }
-        if self.encoder.deadline().is_some_and(|at| now >= at) {
-            let (alarm, warning) = (self.encoder.alarm(), self.encoder.warning());
-            self.encoder.advance(now);
-            self.flags_changed(now, alarm, warning);
-        }
+        self.instrument.settle(now);
         let overdue = self.keeping.overdue(now);
         if overdue {
-            self.events.push(now, Event::KeepFailed);
+            self.tell(now, Happening::KeepFailed);
         }
         overdue
     }
 
     pub(super) fn deadline(&self) -> Deadline {
-        let flags = Deadline::from(self.encoder.deadline());
-        flags.min(self.keeping.deadline()).min(self.next_sample).min(self.restart_by)
-    }
-
-    /// When a turning shaft was looked at last; `now` for one that rests. Up to a millisecond of not
-    /// looking is no standstill.
-    pub(super) fn looked_at(&self, now: Instant) -> Instant {
-        match self.next_sample.instant() {
-            Some(next) if next <= now + SAMPLE_TIME => next - SAMPLE_TIME,
-            _ => now,
-        }
+        self.instrument.deadline().min(self.keeping.deadline()).min(self.restart_by)
     }
 
     /// The flags of assembly 2.
     fn flags(&self) -> u8 {
-        let alarm = if self.encoder.alarm() { ALARM_FLAG } else { 0 };
-        let warning = if self.encoder.warning() { WARNING_FLAG } else { 0 };
+        let alarm = if self.encoder().alarm() { ALARM_FLAG } else { 0 };
+        let warning = if self.encoder().warning() { WARNING_FLAG } else { 0 };
         alarm | warning
     }
 
     fn view(&self) -> View<'_> {
-        View { product: self.product, encoder: &self.encoder }
+        View { product: self.product(), encoder: self.encoder() }
     }
 
     /// The services of one parameter. Save, Restore and Reset are for all parameters together, at
@@ -236,18 +183,18 @@ impl<S: Sensor> Body<S> {
     /// Save, Restore and Reset of class 2Fh.
     fn memory_service(&mut self, now: Instant, service: Service) -> Result<Done, Error> {
         match service {
-            Service::SAVE => self.save(now, self.encoder.block(), false),
+            Service::SAVE => self.save(now, self.encoder().block(), false),
             Service::RESTORE => {
-                if self.keeping.memory == MemoryState::Damaged {
+                if self.keeping.upkeep.memory == MemoryState::Damaged {
                     return Err(GeneralStatus::NO_STORED_DATA.into());
                 }
                 self.load(self.keeping.saved)?;
-                self.events.push(now, Event::Restored);
+                self.tell(now, DeviceNetEvent::Restored);
                 Ok(Done::Now)
             }
             Service::RESET => {
-                self.load(self.encoder.default_block())?;
-                self.events.push(now, Event::Reset);
+                self.load(self.encoder().default_block())?;
+                self.tell(now, DeviceNetEvent::Reset);
                 Ok(Done::Now)
             }
             _ => Err(GeneralStatus::SERVICE_NOT_SUPPORTED.into()),
@@ -266,7 +213,10 @@ impl<S: Sensor> Body<S> {
 
     fn load(&mut self, block: Block) -> Result<(), Error> {
         let before = self.measure();
-        self.encoder.load(block).map_err(|_| Error::from(GeneralStatus::NO_STORED_DATA))?;
+        self.instrument
+            .encoder
+            .load(block)
+            .map_err(|_| Error::from(GeneralStatus::NO_STORED_DATA))?;
         self.produce_anyway |= before != self.measure();
         Ok(())
     }
@@ -274,7 +224,7 @@ impl<S: Sensor> Body<S> {
     /// What the position is measured by: where it really changes, the position is produced however
     /// little it moved.
     fn measure(&self) -> (Settings, i32) {
-        (self.encoder.settings(), self.encoder.offset())
+        (self.encoder().settings(), self.encoder().offset())
     }
 }
 
@@ -283,21 +233,21 @@ impl<S: Sensor> Application for Body<S> {
         Identity {
             vendor: self.factory.vendor,
             device_type: self.factory.device_type,
-            product_code: self.product.product_code(),
+            product_code: self.product().product_code(),
             major_revision: 1,
             minor_revision: 1,
             serial: self.factory.serial,
-            product_name: self.product.product_name,
+            product_name: self.product().product_name,
         }
     }
 
     fn status(&self) -> u16 {
         let defaults = Block {
             crossings_at_change: self.keeping.saved.crossings_at_change,
-            ..Block::default_for(self.product.encoder)
+            ..Block::default_for(self.product().encoder)
         };
         let configured = if self.keeping.saved == defaults { 0 } else { CONFIGURED };
-        let damaged = self.keeping.memory == MemoryState::Damaged;
+        let damaged = self.keeping.upkeep.memory == MemoryState::Damaged;
         configured | if damaged { MINOR_RECOVERABLE_FAULT } else { 0 }
     }
 
@@ -320,7 +270,7 @@ impl<S: Sensor> Application for Body<S> {
     fn produce(&mut self, now: Instant, instance: u8, octets: &mut [u8; 8]) -> usize {
         self.sample(now);
         let [first, second, third, fourth, flags, ..] = octets;
-        [*first, *second, *third, *fourth] = self.encoder.position().to_le_bytes();
+        [*first, *second, *third, *fourth] = self.encoder().position().to_le_bytes();
         if instance != 2 {
             return 4;
         }
@@ -335,14 +285,14 @@ impl<S: Sensor> Application for Body<S> {
     /// The COS delta is judged on the unwrapped position, so that one above half the range works
     /// too; the flags count where they are produced.
     fn has_changed(&mut self, instance: u8) -> bool {
-        let moved = self.encoder.unwrapped().abs_diff(self.produced);
+        let moved = self.encoder().unwrapped().abs_diff(self.produced);
         self.produce_anyway
-            || moved >= u64::from(self.encoder.cos_delta())
+            || moved >= u64::from(self.encoder().cos_delta())
             || instance == 2 && self.produced_flags != self.flags()
     }
 
     fn change_produced(&mut self, _instance: u8) {
-        self.produced = self.encoder.unwrapped();
+        self.produced = self.encoder().unwrapped();
         self.produced_flags = self.flags();
         self.produce_anyway = false;
     }
@@ -388,15 +338,15 @@ impl<S: Sensor> Application for Body<S> {
         // A preset takes effect at the position of this very moment.
         self.sample(now);
         let before = self.measure();
-        let changed = write(&mut self.encoder, value)
+        let changed = write(&mut self.instrument.encoder, value)
             .map_err(|_| Error::from(GeneralStatus::INVALID_ATTRIBUTE_VALUE))?;
         self.produce_anyway |= before != self.measure();
         if row.attribute == PRESET {
             // Every preset is produced, also one that finds its value in place.
             self.produce_anyway = true;
-            self.events.push(now, Event::Preset);
+            self.tell(now, Happening::Preset);
         } else if changed {
-            self.events.push(now, Event::SettingChanged { attribute: row.attribute });
+            self.tell(now, DeviceNetEvent::SettingChanged { attribute: row.attribute });
         }
         Ok(Done::Now)
     }
@@ -428,7 +378,7 @@ impl<S: Sensor> Application for Body<S> {
     fn reset(&mut self, now: Instant, reset: Reset) -> Result<Done, Error> {
         match reset {
             Reset::PowerCycle => Ok(Done::Now),
-            Reset::Defaults => self.save(now, self.encoder.default_block(), true),
+            Reset::Defaults => self.save(now, self.encoder().default_block(), true),
         }
     }
 
@@ -437,7 +387,7 @@ impl<S: Sensor> Application for Body<S> {
     }
 
     fn notice(&mut self, now: Instant, event: codewheel_devicenet::Event) {
-        self.events.push(now, Event::Network(event));
+        self.tell(now, DeviceNetEvent::Network(event));
     }
 }
 

@@ -1,19 +1,22 @@
 //! An encoder on DeviceNet: the server of the bus and the encoder, tied by the rows.
 
 mod body;
+mod keeping;
 pub mod parameter;
 pub mod rows;
 
 use codewheel_devicenet::explicit::GeneralStatus;
-use codewheel_devicenet::{MacId, Server};
+use codewheel_devicenet::{MacId, Server, connection};
 use codewheel_encoder::{Encoder, Kept, Sensor, Start};
 use codewheel_station::can::{self, Filter, Frame};
 use codewheel_station::{Deadline, Instant, Station};
 
 use self::body::Body;
-use crate::event::Event;
-use crate::keeping::{KEEP_TIME, Outcome};
+use self::keeping::{KEEP_TIME, Outcome};
+use crate::event::{DeviceNetEvent, Event, Happening};
+use crate::instrument::Instrument;
 use crate::lamp::Lamp;
+use crate::snapshot::{DeviceNetState, Network};
 use crate::{Product, Snapshot, Switches};
 
 /// What the factory puts into a device besides its product.
@@ -76,13 +79,13 @@ impl<S: Sensor> DeviceNetEncoder<S> {
     /// The product.
     #[must_use]
     pub const fn product(&self) -> &'static Product {
-        self.body.product
+        self.body.product()
     }
 
     /// The encoder inside.
     #[must_use]
     pub const fn encoder(&self) -> &Encoder {
-        &self.body.encoder
+        self.body.encoder()
     }
 
     /// The server inside.
@@ -94,8 +97,7 @@ impl<S: Sensor> DeviceNetEncoder<S> {
     /// The sensor. Whoever changes it makes the device look at it at its next
     /// [`advance`](Station::advance).
     pub const fn sensor_mut(&mut self) -> &mut S {
-        self.body.next_sample = Deadline::at(Instant::ZERO);
-        &mut self.body.sensor
+        self.body.instrument.sensor_mut()
     }
 
     /// Where the switches stand.
@@ -124,8 +126,9 @@ impl<S: Sensor> DeviceNetEncoder<S> {
     /// The record to write into memory at `now`, if there is one. Until [`kept`](Self::kept) has
     /// reported its end, there is no other.
     pub fn keep(&mut self, now: Instant) -> Option<Kept> {
-        let Body { keeping, encoder, product, factory, .. } = &mut self.body;
-        keeping.next(now, product.fingerprint, factory.serial, encoder)
+        let Body { keeping, instrument, factory, .. } = &mut self.body;
+        let fingerprint = instrument.product.fingerprint;
+        keeping.next(now, fingerprint, factory.serial, &instrument.encoder)
     }
 
     /// Whether [`keep`](Self::keep) has a record at `now`.
@@ -139,12 +142,12 @@ impl<S: Sensor> DeviceNetEncoder<S> {
         let good = result.is_ok();
         let outcome = self.body.keeping.kept(now, good);
         if !good {
-            self.body.events.push(now, Event::KeepFailed);
+            self.body.tell(now, Happening::KeepFailed);
         }
         match outcome {
             Outcome::Automatic => {}
             Outcome::Saved { answer } => {
-                self.body.events.push(now, Event::Saved);
+                self.body.tell(now, DeviceNetEvent::Saved);
                 if answer {
                     self.server.complete(Ok(()));
                 }
@@ -159,37 +162,38 @@ impl<S: Sensor> DeviceNetEncoder<S> {
 
     /// The oldest event that has not been fetched.
     pub fn take_event(&mut self) -> Option<(Instant, Event)> {
-        self.body.events.take()
+        self.body.instrument.events.take().map(|(at, event)| (at, event.into()))
     }
 
     /// What the device shows of itself at `now`.
     #[must_use]
     pub fn snapshot(&self, now: Instant) -> Snapshot {
-        let Body { product, switches, factory, encoder, keeping, powered_at, .. } = &self.body;
+        let Body { instrument, switches, factory, keeping, .. } = &self.body;
+        let Instrument { product, encoder, powered_at, events, .. } = instrument;
         let since = now.since(*powered_at);
         let lamp = Lamp::of(self.server.status(), since);
         Snapshot {
             product,
-            switches: *switches,
             serial: factory.serial,
             position: encoder.position(),
             code: encoder.code(),
-            velocity: encoder.velocity(self.body.looked_at(now)),
+            velocity: encoder.velocity(instrument.looked_at(now)),
             in_force: encoder.block(),
             saved: keeping.saved,
             alarm: encoder.alarm(),
             warning: encoder.warning(),
             lamp,
             colour: lamp.colour(since),
-            master: self.server.master(),
-            explicit: self.server.connection_state(codewheel_devicenet::connection::EXPLICIT),
-            poll: self.server.connection_state(codewheel_devicenet::connection::POLL),
-            change_of_state: self
-                .server
-                .connection_state(codewheel_devicenet::connection::CHANGE_OF_STATE),
-            memory: keeping.memory,
-            writes: keeping.writes,
-            events_lost: self.body.events.lost(),
+            network: Network::DeviceNet(DeviceNetState {
+                switches: *switches,
+                master: self.server.master(),
+                explicit: self.server.connection_state(connection::EXPLICIT),
+                poll: self.server.connection_state(connection::POLL),
+                change_of_state: self.server.connection_state(connection::CHANGE_OF_STATE),
+            }),
+            memory: keeping.upkeep.memory,
+            writes: keeping.upkeep.writes,
+            events_lost: events.lost(),
         }
     }
 

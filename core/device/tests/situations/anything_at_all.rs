@@ -201,11 +201,12 @@ impl Course {
         snapshot.in_force.check(model).expect("the settings in force are legal");
         snapshot.saved.check(model).expect("the saved settings are legal");
         assert!(snapshot.position < snapshot.in_force.settings.total_resolution);
-        let [explicit, poll, change] = [snapshot.explicit, snapshot.poll, snapshot.change_of_state];
+        let network = snapshot.devicenet().expect("a DeviceNet device");
+        let [explicit, poll, change] = [network.explicit, network.poll, network.change_of_state];
         let ios = [poll, change];
         assert!(!matches!(explicit, Some(State::Configuring | State::TimedOut)));
         let exists = explicit.is_some() || ios.iter().any(Option::is_some);
-        assert_eq!(snapshot.master.is_some(), exists);
+        assert_eq!(network.master.is_some(), exists);
         let lives = explicit == Some(State::Established) || ios.contains(&Some(State::Established));
         assert!(lives || !exists, "a dead master owns {explicit:?} {ios:?}");
         let silent = matches!(
