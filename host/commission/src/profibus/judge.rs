@@ -7,7 +7,7 @@ use profirust::fdl::{
 
 use super::master::Master;
 use super::settings::HIGHEST_ADDRESS;
-use super::slave::{Diagnosis, Service, SlaveState};
+use super::slave::{Diagnosis, Service, SlaveState, Validating};
 
 /// From whom an answer is due, and to what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,7 +94,7 @@ impl Master {
             if let Some(slave) = self.slaves.get_mut(place)
                 && service == Service::CheckConfiguration
             {
-                slave.validating_since = Some(now);
+                slave.validating = Some(Validating::begin(now));
             }
         }
         fits
@@ -137,6 +137,9 @@ impl Master {
                 }
                 let Some(diagnosis) = Diagnosis::read(data.pdu) else { return false };
                 slave.diagnosis = Some(diagnosis);
+                if let Some(validating) = &mut slave.validating {
+                    validating.note_diagnosis();
+                }
             }
             Service::DataExchange => {
                 let (given, expected) = (data.pdu.len(), slave.settings.inputs);

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use codewheel_station::{Duration, Instant};
+use codewheel_station::Instant;
 use profirust::dp::{DpMaster, PeripheralEvent, PeripheralHandle};
 use profirust::fdl::FdlActiveStation;
 use thiserror::Error;
@@ -12,12 +12,8 @@ use super::event::{Event, Events};
 use super::judge::Awaited;
 use super::line::Line;
 use super::settings::{MasterSettings, SettingsError, SlaveSettings};
-use super::slave::{CycleTimes, Service, Slave, SlaveState, SlaveView};
+use super::slave::{CycleTimes, Service, Slave, SlaveState, SlaveView, Validating};
 use super::telegram::Receiver;
-
-/// How long a slave may take to get ready once its configuration was confirmed. Where a
-/// disturbance was taken for the confirmation, it never does.
-const READY_TIME: Duration = Duration::from_secs(2);
 
 /// What has been counted since the master was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -217,7 +213,7 @@ impl Master {
             if slave.unanswered > 0 {
                 continue;
             }
-            if slave.validating_since.take_if(|since| now.since(*since) >= READY_TIME).is_some() {
+            if slave.validating.take_if(|validating| validating.is_hopeless(now)).is_some() {
                 self.dp.get_mut(slave.handle).reset_address(slave.settings.address);
             }
             if slave.outputs_waiting {
@@ -260,7 +256,7 @@ impl Master {
             PeripheralEvent::Configured => {
                 slave.state = SlaveState::Configuring;
                 slave.told = false;
-                slave.validating_since = None;
+                slave.validating = None;
                 return self.events.push(Event::Configured { address });
             }
             PeripheralEvent::DataExchanged => {
@@ -281,7 +277,7 @@ impl Master {
             PeripheralEvent::ParameterError => SlaveState::ParameterError,
             PeripheralEvent::ConfigError => SlaveState::ConfigurationError,
         };
-        slave.validating_since = None;
+        slave.validating = None;
         if slave.state != fault {
             slave.state = fault;
             self.events.push(match fault {
@@ -298,7 +294,7 @@ impl Master {
             return;
         };
         slave.told = false;
-        slave.validating_since = None;
+        slave.validating = None;
         if slave.state != SlaveState::Absent {
             slave.state = SlaveState::Absent;
             slave.losses += 1;
@@ -317,7 +313,7 @@ impl Master {
             slave.told = false;
         }
         if service == Service::DataExchange {
-            slave.validating_since = Some(now);
+            slave.validating = Some(Validating::begin(now));
         }
         if !slave.told {
             slave.told = true;

@@ -31,7 +31,8 @@
 //! So answers pass only from the slave that was asked, to this master, with the SAPs, the kind and
 //! the length that the request calls for; other answers count as none. Requests and tokens of other
 //! masters pass. After a collision of addresses the master rejoins the bus a second later; a slave that
-//! is not ready two seconds after its Chk_Cfg is begun anew; what users set waits for the answer.
+//! two seconds and three diagnoses after its Chk_Cfg is not ready is begun anew; what users set waits
+//! for the answer.
 
 mod clock;
 mod event;

@@ -150,6 +150,35 @@ impl CycleTimes {
     }
 }
 
+/// How long a slave may take to get ready once its configuration was confirmed, and how often it may
+/// say that it is not: on a slow bus with many slaves a round lasts longer. Where a disturbance was
+/// taken for the confirmation, it never gets ready.
+const READY_TIME: Duration = Duration::from_secs(2);
+const READY_DIAGNOSES: u32 = 3;
+
+/// A slave on its way from Chk_Cfg to data exchange.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Validating {
+    since: Instant,
+    diagnoses: u32,
+}
+
+impl Validating {
+    pub(super) const fn begin(now: Instant) -> Self {
+        Self { since: now, diagnoses: 0 }
+    }
+
+    /// It has told where it stands.
+    pub(super) const fn note_diagnosis(&mut self) {
+        self.diagnoses = self.diagnoses.saturating_add(1);
+    }
+
+    /// Whether it had its time and is not ready.
+    pub(super) fn is_hopeless(&self, now: Instant) -> bool {
+        now.since(self.since) >= READY_TIME && self.diagnoses >= READY_DIAGNOSES
+    }
+}
+
 /// A slave as the master keeps it.
 #[derive(Debug)]
 pub(super) struct Slave {
@@ -171,8 +200,8 @@ pub(super) struct Slave {
     pub(super) refused: bool,
     /// A refusal, or inputs of a wrong length, were told; told once in a bring-up.
     pub(super) told: bool,
-    /// Since when it is to get ready for data exchange.
-    pub(super) validating_since: Option<Instant>,
+    /// It is to get ready for data exchange.
+    pub(super) validating: Option<Validating>,
     /// Outputs or a wish for the diagnosis wait for the next request.
     pub(super) outputs_waiting: bool,
     pub(super) diagnosis_waiting: bool,
@@ -193,7 +222,7 @@ impl Slave {
             unanswered: 0,
             refused: false,
             told: false,
-            validating_since: None,
+            validating: None,
             outputs_waiting: false,
             diagnosis_waiting: false,
             settings,
