@@ -3,15 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use codewheel_device::{Product, product};
+use codewheel_device::Product;
 use codewheel_link::BusUri;
 use codewheel_plant::TimeSpan;
-use codewheel_station::can::BitRate;
 
 /// An absolute rotary encoder made of software.
 ///
-/// Without a verb it runs the demo: three encoders on a virtual DeviceNet at 500k, polled by a
-/// scanner, shown in a live table until Ctrl-C.
+/// Without a verb it runs the demo: a virtual DeviceNet at 500k and a virtual PROFIBUS at 1.5M with
+/// three encoders each, polled by masters, shown in a live table until Ctrl-C.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -52,7 +51,7 @@ impl Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
     Run(RunArguments),
-    Encoder(EncoderArguments),
+    Encoder(Box<EncoderArguments>),
     Models(ModelsArguments),
     Describe(DescribeArguments),
     /// Print the JSON Schema of plant files, for editors that complete and check them.
@@ -96,16 +95,29 @@ Examples:
   codewheel encoder amg11-d29 --bus slcan-listen:127.0.0.1:4001 --address 5
   codewheel encoder hmg10-d13 --bus slcan-listen:127.0.0.1:4001 --address 5 \\
       --shaft 'sine amplitude=90deg period=4s' --memory encoder.memory
+  codewheel encoder amg11-p29 --bus rs485-listen:pty:./pb --address 7 --baud 19200 \\
+      --fault 'jump steps=4000 at=30s'
+  codewheel encoder heag162-p29 --bus rs485:/dev/ttyUSB0 --address 7 --ssi-word 25
 
 Shafts: still | turn rpm=60 | sine amplitude=90deg period=2s |
         profile 0s:0 1s:90deg 3s:2turns [repeat] | csv FILE (lines of seconds,turns).
         Each takes angle=, where it begins: raw steps (4096), 90deg or 1.5turns.
 
-Buses:  slcan-listen:HOST:PORT   play a SLCAN adapter that any number of clients share
-        slcan:HOST:PORT          be the client of a SLCAN adapter on TCP
-        virtual:NAME             a bus inside this process")]
+Buses:  slcan-listen:HOST:PORT   DeviceNet: play a SLCAN adapter that any number of clients share
+        slcan:HOST:PORT          DeviceNet: be the client of a SLCAN adapter on TCP
+        rs485-listen:HOST:PORT   PROFIBUS: be a line on TCP that any number of clients share
+        rs485-listen:pty:PATH    PROFIBUS: be a line that is a serial port of this machine
+        rs485:HOST:PORT          PROFIBUS: be the client of such a line
+        rs485:/dev/tty…          PROFIBUS: a serial port
+        virtual:NAME             a bus inside this process
+
+Faults: jump steps=N | stuck | free | cell-low | cell-right | power-cut [for=T] |
+        drop-answers [probability=P] [count=N] [for=T] | late-answers delay=T [for=T] |
+        bus-off (DeviceNet) | ssi-unplugged | ssi-short | ssi-wrong-word bits=N |
+        ssi-no-monoflop | ssi-flipped-bits bits=N | ssi-right (HEAG 162).
+        Each takes at=, when it happens, from the start.")]
 pub(crate) struct EncoderArguments {
-    /// The model, such as amg11-d29; `codewheel models` lists them
+    /// The model, such as amg11-d29 or amg11-p29; `codewheel models` lists them
     #[arg(value_parser = parse_model)]
     pub(crate) model: &'static Product,
 
@@ -113,15 +125,16 @@ pub(crate) struct EncoderArguments {
     #[arg(long, value_name = "URI")]
     pub(crate) bus: BusUri,
 
-    /// The address switches, 0–63: the MAC ID
-    #[arg(long, value_name = "N", value_parser = parse_address, allow_negative_numbers = true)]
-    pub(crate) address: u8,
+    /// The address switches: the MAC ID, 0–63, or the station address, 0–99
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub(crate) address: String,
 
-    /// The bit rate switches: 125k, 250k or 500k
-    #[arg(long, value_name = "RATE", default_value = "125k", value_parser = parse_bit_rate)]
-    pub(crate) baud: BitRate,
+    /// The bit rate. DeviceNet: 125k, 250k or 500k, by default 125k. PROFIBUS: 9.6k to 12M or
+    /// 9600 to 12000000, by default 1.5M, and what a serial port is found to run at
+    #[arg(long, value_name = "RATE")]
+    pub(crate) baud: Option<String>,
 
-    /// What the shaft does
+    /// What the shaft does; of a HEAG 162 that of the encoder at its SSI line
     #[arg(long, value_name = "SHAFT", default_value = "still")]
     pub(crate) shaft: String,
 
@@ -133,6 +146,43 @@ pub(crate) struct EncoderArguments {
     /// The serial number; by default what the memory holds, else the address
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(crate) serial: Option<u32>,
+
+    /// What goes wrong, and when, such as 'jump steps=4000 at=5s'; can be given many times
+    #[arg(long = "fault", value_name = "FAULT")]
+    pub(crate) faults: Vec<String>,
+
+    #[command(flatten)]
+    pub(crate) ssi: SsiArguments,
+}
+
+/// How a HEAG 162 reads its SSI line.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "SSI line (HEAG 162)")]
+pub(crate) struct SsiArguments {
+    /// A real encoder at an SPI controller of Linux, spidev:/dev/spidev0.0, in place of a virtual
+    /// one that --shaft moves
+    #[arg(long, value_name = "LINE")]
+    pub(crate) ssi: Option<String>,
+
+    /// The bits of the SSI word: that of the product, or 25 for a heag162-p29
+    #[arg(long, value_name = "BITS")]
+    pub(crate) ssi_word: Option<u8>,
+
+    /// How the code is written: gray or binary; by default gray
+    #[arg(long, value_name = "CODE", value_parser = ["gray", "binary"])]
+    pub(crate) ssi_code: Option<String>,
+
+    /// The clock, 100k to 1M; by default 500k
+    #[arg(long, value_name = "CLOCK")]
+    pub(crate) ssi_clock: Option<String>,
+
+    /// How long the encoder wants no clock before it latches anew; by default 20us
+    #[arg(long, value_name = "TIME")]
+    pub(crate) ssi_monoflop: Option<TimeSpan>,
+
+    /// Read each word twice and compare
+    #[arg(long)]
+    pub(crate) ssi_double_read: bool,
 }
 
 /// List the models.
@@ -143,7 +193,7 @@ pub(crate) struct ModelsArguments {
     pub(crate) json: bool,
 }
 
-/// Describe one model: geometry, switches, lamp, attributes.
+/// Describe one model: geometry, switches, lamp, and what its bus can read and write.
 #[derive(Args, Debug)]
 pub(crate) struct DescribeArguments {
     /// The model, such as amg11-d29
@@ -153,20 +203,24 @@ pub(crate) struct DescribeArguments {
 
 fn parse_model(text: &str) -> Result<&'static Product, String> {
     Product::find(text).ok_or_else(|| {
-        let models: Vec<_> = product::DEVICENET.iter().map(|product| product.model).collect();
+        let models: Vec<_> = Product::all().map(|product| product.model).collect();
         format!("the models are {}", models.join(", "))
     })
 }
 
-fn parse_address(text: &str) -> Result<u8, String> {
-    text.parse().ok().filter(|address| *address <= 63).ok_or_else(|| "DeviceNet has 0–63".into())
-}
-
-fn parse_bit_rate(text: &str) -> Result<BitRate, String> {
-    BitRate::ALL
-        .into_iter()
-        .find(|rate| rate.to_string().eq_ignore_ascii_case(text))
-        .ok_or_else(|| "the rates are 125k, 250k and 500k".into())
+impl SsiArguments {
+    /// What was given, with the keys of plant files.
+    pub(crate) fn keys(&self) -> Vec<(&'static str, String)> {
+        let keys = [
+            ("line", self.ssi.clone()),
+            ("word", self.ssi_word.map(|bits| bits.to_string())),
+            ("code", self.ssi_code.clone()),
+            ("clock", self.ssi_clock.clone()),
+            ("monoflop", self.ssi_monoflop.map(|time| time.to_string())),
+            ("double_read", self.ssi_double_read.then(|| "true".to_owned())),
+        ];
+        keys.into_iter().filter_map(|(key, value)| Some((key, value?))).collect()
+    }
 }
 
 #[cfg(test)]

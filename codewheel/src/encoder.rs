@@ -3,41 +3,132 @@
 use std::io::Write;
 use std::sync::atomic::Ordering;
 
-use codewheel_device::Switches;
-use codewheel_link::{BusUri, Clock};
-use codewheel_plant::{BusPlan, DevicePlan, PortBus, Report};
-use codewheel_sim::can::Faults;
+use codewheel_device::product::Bus;
+use codewheel_device::{Switches, profibus};
+use codewheel_link::{BusUri, Clock, Medium};
+use codewheel_plant::{
+    BusPlan, DeviceNet, DeviceOptions, DevicePlan, Fault, FieldBus, PortBus, Profibus, Report,
+    SensorPlan,
+};
 use codewheel_sim::shaft::Shaft;
+use codewheel_station::can::BitRate;
+use codewheel_station::rs485::BaudRate;
 
 use crate::arguments::{Chatter, EncoderArguments};
 use crate::failure::Failure;
 use crate::signals::stop_flag;
 use crate::tell;
 
-pub(crate) fn run(arguments: EncoderArguments, chatter: Chatter) -> Result<(), Failure> {
-    let EncoderArguments { model: product, bus, address, baud, shaft, memory, serial } = arguments;
-    let geometry = product.encoder.geometry;
-    let shaft = Shaft::parse(&shaft, geometry.singleturn_resolution(), geometry.revolutions())?;
-    let is_virtual = matches!(bus, BusUri::Virtual(_));
-    let device = DevicePlan {
-        memory,
-        serial,
-        ..DevicePlan::new(product, Switches::set_to(address, baud), shaft)
+pub(crate) fn run(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failure> {
+    match arguments.model.bus {
+        Bus::DeviceNet => devicenet(arguments, chatter),
+        Bus::Profibus => profibus(arguments, chatter),
+    }
+}
+
+fn devicenet(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failure> {
+    joins(arguments, Medium::Can)?;
+    let address = address(arguments, 63, "DeviceNet has 0–63")?;
+    let rate = match &arguments.baud {
+        None => BitRate::Kbit125,
+        Some(text) => BitRate::ALL
+            .into_iter()
+            .find(|rate| rate.to_string().eq_ignore_ascii_case(text))
+            .ok_or_else(|| no_rate(text, "125k, 250k and 500k"))?,
     };
-    let plan = BusPlan {
-        name: bus.to_string(),
-        uri: bus,
-        bit_rate: baud,
-        faults: Faults::default(),
-        seed: 0,
-        devices: vec![device],
-        masters: Vec::new(),
+    let device = device(arguments, Switches::set_to(address, rate))?;
+    play(arguments, BusPlan::<DeviceNet>::new("", arguments.bus.clone(), rate), device, chatter)
+}
+
+fn profibus(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failure> {
+    joins(arguments, Medium::Rs485)?;
+    let address = address(arguments, 99, "the switches of a PROFIBUS encoder have 0–99")?;
+    let rate = match &arguments.baud {
+        None => BaudRate::Mbit1_5,
+        Some(text) => Profibus::rate(text).ok_or_else(|| {
+            let rates: Vec<_> = BaudRate::ALL.iter().map(ToString::to_string).collect();
+            no_rate(text, &rates.join(", "))
+        })?,
     };
+    let device = device(arguments, profibus::Switches::set_to(address))?;
+    // A serial port runs at some rate, which nobody need know.
+    let auto_baud = arguments.baud.is_none() && matches!(arguments.bus, BusUri::Rs485Device(_));
+    let device = DevicePlan { options: DeviceOptions { auto_baud }, ..device };
+    play(arguments, BusPlan::<Profibus>::new("", arguments.bus.clone(), rate), device, chatter)
+}
+
+/// Whether the bus carries what the model speaks.
+fn joins(arguments: &EncoderArguments, medium: Medium) -> Result<(), Failure> {
+    let EncoderArguments { model, bus, .. } = arguments;
+    match bus.medium() {
+        Medium::Any if medium == Medium::Can => return Ok(()),
+        Medium::Any => {
+            return Err(Failure::Usage(format!(
+                "nobody else can join a virtual PROFIBUS of this process: write {}, or a plant \
+                 file for `codewheel run`",
+                medium.forms()
+            )));
+        }
+        given if given == medium => return Ok(()),
+        _ => {}
+    }
+    Err(Failure::Usage(format!(
+        "{} speaks {}, which runs on {medium}, and {bus} carries {}: write {}",
+        model.model,
+        model.bus,
+        bus.medium(),
+        medium.forms()
+    )))
+}
+
+fn address(arguments: &EncoderArguments, highest: u8, range: &str) -> Result<u8, Failure> {
+    let text = &arguments.address;
+    let address = text.parse().ok().filter(|address| *address <= highest);
+    address.ok_or_else(|| {
+        Failure::Usage(format!("invalid value '{text}' for '--address <N>': {range}"))
+    })
+}
+
+fn no_rate(text: &str, rates: &str) -> Failure {
+    Failure::Usage(format!("invalid value '{text}' for '--baud <RATE>': the rates are {rates}"))
+}
+
+fn device<B: FieldBus>(
+    arguments: &EncoderArguments,
+    switches: B::Switches,
+) -> Result<DevicePlan<B>, Failure> {
+    let product = arguments.model;
+    let sensor = SensorPlan::parse(product, &arguments.ssi.keys()).map_err(Failure::Usage)?;
+    let geometry = sensor.geometry().unwrap_or(product.encoder.geometry);
+    let (steps, turns) = (geometry.singleturn_resolution(), geometry.revolutions());
+    let shaft = Shaft::parse(&arguments.shaft, steps, turns)?;
+    let fault = |words: &String| {
+        Fault::parse(words, product, &sensor)
+            .map_err(|why| Failure::Usage(format!("--fault '{words}': {why}")))
+    };
+    Ok(DevicePlan {
+        faults: arguments.faults.iter().map(fault).collect::<Result<_, _>>()?,
+        sensor: sensor.clone(),
+        memory: arguments.memory.clone(),
+        serial: arguments.serial,
+        ..DevicePlan::new(product, switches, shaft)
+    })
+}
+
+fn play<B: FieldBus>(
+    arguments: &EncoderArguments,
+    mut plan: BusPlan<B>,
+    device: DevicePlan<B>,
+    chatter: Chatter,
+) -> Result<(), Failure> {
+    let is_virtual = plan.is_virtual();
+    plan.devices.push(device);
     let mut bus = PortBus::power_up(plan, Clock::new())?;
     let waker = bus.waker();
     let stop = stop_flag(move || waker.wake())?;
     let mut out = std::io::stdout().lock();
-    writeln!(out, "ready {} address {address} on {}", product.model, bus.uri())?;
+    let EncoderArguments { model, address, .. } = arguments;
+    writeln!(out, "ready {} address {address} on {}", model.model, bus.uri())?;
     out.flush()?;
     if is_virtual && chatter > Chatter::Quiet {
         eprintln!(
@@ -55,7 +146,7 @@ pub(crate) fn run(arguments: EncoderArguments, chatter: Chatter) -> Result<(), F
     Ok(result?)
 }
 
-fn tell(bus: &mut PortBus, chatter: Chatter) {
+fn tell<B: FieldBus>(bus: &mut PortBus<B>, chatter: Chatter) {
     for report in bus.take_reports().iter().filter(|report| tell::is_for(report, chatter)) {
         let Report { at, what } = report;
         eprintln!("codewheel: {at} {what}");

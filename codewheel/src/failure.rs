@@ -11,6 +11,8 @@ use thiserror::Error;
 /// Why a verb has not done what it was asked for.
 #[derive(Debug, Error)]
 pub(crate) enum Failure {
+    #[error("{0}")]
+    Usage(String),
     #[error(transparent)]
     Shaft(#[from] ShaftError),
     #[error(transparent)]
@@ -34,9 +36,14 @@ impl Failure {
     /// 2 for usage, 3 for bus or I/O.
     pub(crate) fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Self::Shaft(_)
+            Self::Usage(_)
+            | Self::Shaft(_)
             | Self::Plant(PlantError::Wrong(_))
-            | Self::Start(StartError::Memory(MemoryError::AnotherProduct { .. })) => 2,
+            | Self::Start(
+                StartError::Memory(MemoryError::AnotherProduct { .. })
+                | StartError::Master(_)
+                | StartError::Ssi(_),
+            ) => 2,
             Self::Plant(PlantError::Read { .. })
             | Self::Start(_)
             | Self::Link(_)

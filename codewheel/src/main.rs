@@ -23,7 +23,7 @@ fn main() -> ExitCode {
         None => run::demo(chatter),
         Some(Verb::Run(arguments)) => run::run(&arguments, chatter),
         Some(Verb::Schema) => run::schema(),
-        Some(Verb::Encoder(encoder)) => encoder::run(encoder, chatter),
+        Some(Verb::Encoder(encoder)) => encoder::run(&encoder, chatter),
         Some(Verb::Models(models)) => models::run(&models),
         Some(Verb::Describe(describe)) => describe::run(&describe),
     };

@@ -34,8 +34,8 @@ pub(crate) fn demo(chatter: Chatter) -> Result<(), Failure> {
         .map_err(|complaint| Failure::Plant(complaint.into()))?;
     if chatter > Chatter::Quiet {
         eprintln!(
-            "codewheel: a virtual DeviceNet at 500k with three encoders and a scanner; Ctrl-C ends \
-             it, `codewheel --help` shows what else there is"
+            "codewheel: a virtual DeviceNet at 500k and a virtual PROFIBUS at 1.5M, each with three \
+             encoders and a master; Ctrl-C ends it, `codewheel --help` shows what else there is"
         );
     }
     play(plant, None, false, chatter)
@@ -59,11 +59,11 @@ fn play(
         .buses
         .iter()
         .map(|bus| {
-            let devices = count(bus.devices.len(), "device");
-            format!("{devices}, {}", count(bus.masters.len(), "master"))
+            let devices = count(bus.devices(), "device");
+            format!("{devices}, {}", count(bus.masters(), "master"))
         })
         .collect();
-    let names: Vec<_> = plant.buses.iter().map(|bus| bus.name.clone()).collect();
+    let names: Vec<_> = plant.buses.iter().map(|bus| bus.name().to_owned()).collect();
     let running = plant.start(show.period())?;
     if chatter > Chatter::Quiet {
         for ((name, uri), crew) in names.iter().zip(running.uris()).zip(crews) {

@@ -7,9 +7,10 @@ mod table;
 use std::io::{self, IsTerminal};
 use std::time::Duration;
 
+use codewheel_device::{DeviceNetState, Network, ProfibusState};
 use codewheel_devicenet::connection::State;
-use codewheel_devicenet::scanner::SlaveState;
-use codewheel_plant::{BusSnapshot, DeviceSnapshot};
+use codewheel_plant::{BusSnapshot, DeviceSnapshot, SlaveSnapshot, SlaveState};
+use codewheel_profibus as profibus;
 
 /// One way to show a plant.
 pub(crate) trait Show {
@@ -48,34 +49,67 @@ fn fresh<'a>(
 
 /// Where a device stands with its master, or, where nobody here masters it, what it says itself.
 fn connection(device: &DeviceSnapshot) -> &'static str {
+    let network = device.device.as_ref().map(|device| &device.network);
     if let Some(master) = &device.master {
-        return match master.state {
-            SlaveState::Absent => "absent",
-            SlaveState::Configuring => "configuring",
-            SlaveState::Running => match device.device.as_ref().map(established) {
-                Some(kind) => kind,
-                None => "running",
-            },
-            SlaveState::Refused(_) => "refused",
+        return match (master.state, network) {
+            (SlaveState::Absent, _) => word(SlaveState::Absent),
+            (_, Some(Network::Profibus(state))) => standing(state),
+            (SlaveState::Running, Some(Network::DeviceNet(state))) => established(state),
+            (state, _) => word(state),
         };
     }
-    let Some(device) = &device.device else { return "absent" };
-    match (device.poll.or(device.change_of_state), device.explicit) {
-        (Some(State::Established), _) => established(device),
-        (Some(State::TimedOut), _) => "timed-out",
-        (Some(_), _) => "configuring",
-        (None, Some(_)) => "explicit",
-        (None, None) => "none",
+    match network {
+        None => "absent",
+        Some(Network::Profibus(state)) => standing(state),
+        Some(Network::DeviceNet(state)) => {
+            match (state.poll.or(state.change_of_state), state.explicit) {
+                (Some(State::Established), _) => established(state),
+                (Some(State::TimedOut), _) => "timed-out",
+                (Some(_), _) => "configuring",
+                (None, Some(_)) => "explicit",
+                (None, None) => "none",
+            }
+        }
     }
 }
 
-/// Which I/O connection a device exchanges data on.
-const fn established(device: &codewheel_device::Snapshot) -> &'static str {
-    match (device.poll, device.change_of_state) {
+/// The slaves that a master of this bus serves and that are none of its devices, by address.
+fn strangers(bus: &BusSnapshot) -> impl Iterator<Item = &(u8, SlaveSnapshot)> {
+    let slaves = bus.masters.iter().flat_map(|master| &master.slaves);
+    slaves.filter(|(address, _)| bus.devices.iter().all(|device| device.address != *address))
+}
+
+/// Where a slave stands of which only its master can tell.
+const fn word(state: SlaveState) -> &'static str {
+    match state {
+        SlaveState::Absent => "absent",
+        SlaveState::Configuring => "configuring",
+        SlaveState::Running => "running",
+        SlaveState::Refused => "refused",
+    }
+}
+
+/// Which I/O connection a server exchanges data on.
+const fn established(state: &DeviceNetState) -> &'static str {
+    match (state.poll, state.change_of_state) {
         (Some(State::Established), Some(State::Established)) => "polled+cos",
         (Some(State::Established), _) => "polled",
         (_, Some(State::Established)) => "cos",
         _ => "explicit",
+    }
+}
+
+/// Where a slave stands on its way to data exchange, with the names of the standard.
+const fn standing(state: &ProfibusState) -> &'static str {
+    match state.state {
+        _ if state.baud_rate.is_none() => "baud-search",
+        profibus::State::WaitPrm if state.faults.parameters || state.faults.not_supported => {
+            "prm-fault"
+        }
+        profibus::State::WaitPrm if state.faults.configuration => "cfg-fault",
+        profibus::State::WaitPrm => "wait-prm",
+        profibus::State::WaitCfg => "wait-cfg",
+        profibus::State::DataExchange => "data-exch",
     }
 }
 
@@ -90,8 +124,7 @@ fn rpm(device: &codewheel_device::Snapshot) -> f64 {
     device.velocity as f64 * 60.0 / steps
 }
 
-/// The last poll cycle of the master, in milliseconds.
-fn cycle_ms(device: &DeviceSnapshot) -> Option<f64> {
-    let master = device.master.as_ref()?;
-    Some(master.cycle.last.as_nanos() as f64 / 1e6)
+/// The last cycle of the master, in milliseconds.
+fn cycle_ms(master: &SlaveSnapshot) -> f64 {
+    master.cycle.last.as_nanos() as f64 / 1e6
 }

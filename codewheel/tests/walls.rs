@@ -60,6 +60,7 @@ const ANY_DEVICE: &str = "a protocol book serves any device";
 const LABORATORY: &str = "the product does not know the laboratory";
 const VIRTUAL_TIME: &str = "the laboratory runs in virtual time or not at all";
 const SENSOR_LINE: &str = "a sensor line does not know which bus its code goes to";
+const RECORDED: &str = "a capture does not know where its traffic came from";
 const SNAPSHOTS: &str = "the page sees snapshots, events and commands, no protocol";
 const FIRMWARE: &str = "firmware, fuzzer and simulator run the same bytes of core";
 const GROUND: &str = "the ground floor carries the others";
@@ -129,6 +130,15 @@ const ROOMS: &[Room] = &[
     },
     Room { name: "codewheel-datasheet", floor: Floor::Host, walls: &[] },
     Room { name: "codewheel-commission", floor: Floor::Host, walls: &[] },
+    Room {
+        name: "codewheel-capture",
+        floor: Floor::Host,
+        walls: &[
+            never("codewheel-link", RECORDED),
+            never("codewheel-plant", RECORDED),
+            never("codewheel-sim", RECORDED),
+        ],
+    },
     Room { name: "codewheel-plant", floor: Floor::Host, walls: &[] },
     Room {
         name: "codewheel-dashboard",

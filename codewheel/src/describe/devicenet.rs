@@ -1,37 +1,25 @@
-//! `codewheel describe`: one model in words, from the rows that answer the wire.
+//! A DeviceNet model in words.
 
 use std::io::Write;
 
+use codewheel_device::Product;
 use codewheel_device::devicenet::rows::{ENCODER_POSITION, ROWS, Row, Source, Value, View};
 use codewheel_encoder::Encoder;
 use comfy_table::{Table, presets};
 
-use crate::arguments::DescribeArguments;
+use super::facts;
 use crate::failure::Failure;
 
-pub(crate) fn run(arguments: &DescribeArguments) -> Result<(), Failure> {
-    let product = arguments.model;
-    let geometry = product.encoder.geometry;
-    let mut out = std::io::stdout().lock();
-    writeln!(out, "{} ({})", product.title, product.model)?;
-    let shaft = if product.family.has_hollow_shaft() { "hollow" } else { "solid" };
-    let facts = [
-        ("Bus", "DeviceNet, Group 2 Only Server, 125k, 250k, 500k".to_owned()),
-        ("Shaft", shaft.to_owned()),
-        ("Steps per turn", geometry.singleturn_resolution().to_string()),
-        ("Turns", geometry.revolutions().to_string()),
-        ("Product code", format!("{:02X}h", product.product_code())),
-        ("Product name", product.product_name.to_owned()),
-        ("EDS file", product.eds_file.to_owned()),
-        (
-            "Lithium cell",
-            if product.encoder.lithium_cell { "yes, with a low-voltage warning" } else { "no" }
-                .to_owned(),
-        ),
-    ];
-    for (name, fact) in facts {
-        writeln!(out, "  {name:<16}{fact}")?;
-    }
+pub(super) fn describe(product: &Product, out: &mut impl Write) -> Result<(), Failure> {
+    facts(
+        product,
+        &[
+            ("Bus", "DeviceNet, Group 2 Only Server, 125k, 250k, 500k".to_owned()),
+            ("Product code", format!("{:02X}h", product.product_code())),
+            ("EDS file", product.data_sheet.to_owned()),
+        ],
+        out,
+    )?;
     writeln!(
         out,
         "\nSwitches (read at power-up)

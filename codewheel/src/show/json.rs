@@ -2,10 +2,10 @@
 
 use std::io::{self, Write};
 
-use codewheel_plant::{BusSnapshot, DeviceSnapshot, Report};
+use codewheel_plant::{BusSnapshot, DeviceSnapshot, Report, SlaveSnapshot};
 use serde::Serialize;
 
-use super::{Show, connection, cycle_ms, fresh, lamp, rpm};
+use super::{Show, connection, cycle_ms, fresh, lamp, rpm, strangers, word};
 
 pub(super) struct Json;
 
@@ -35,6 +35,21 @@ struct Line<'a> {
     events: Vec<Event>,
 }
 
+/// A slave that is no device of this plant, as its master sees it.
+#[derive(Serialize)]
+struct StrangerLine<'a> {
+    at: f64,
+    bus: &'a str,
+    uri: &'a str,
+    address: u8,
+    position: Option<u32>,
+    alarm: Option<bool>,
+    warning: Option<bool>,
+    connection: &'a str,
+    polls_per_second: f64,
+    cycle_ms: f64,
+}
+
 /// What happened on a bus itself.
 #[derive(Serialize)]
 struct BusLine<'a> {
@@ -57,6 +72,9 @@ impl Show for Json {
         for bus in fresh(newest, places) {
             for device in &bus.devices {
                 write(&mut out, &line(bus, device))?;
+            }
+            for (address, slave) in strangers(bus) {
+                write(&mut out, &stranger(bus, *address, slave))?;
             }
             if !bus.reports.is_empty() {
                 let (at, events) = (seconds(bus.at), events(&bus.reports));
@@ -104,8 +122,23 @@ fn line<'a>(bus: &'a BusSnapshot, device: &'a DeviceSnapshot) -> Line<'a> {
         lamp: lamp(device),
         connection: connection(device),
         polls_per_second: device.master.as_ref().map(|master| master.answers_per_second),
-        cycle_ms: cycle_ms(device),
+        cycle_ms: device.master.as_ref().map(cycle_ms),
         bus_load: bus.load,
         events: events(&device.reports),
+    }
+}
+
+fn stranger<'a>(bus: &'a BusSnapshot, address: u8, slave: &SlaveSnapshot) -> StrangerLine<'a> {
+    StrangerLine {
+        at: seconds(bus.at),
+        bus: &bus.name,
+        uri: &bus.uri,
+        address,
+        position: slave.position,
+        alarm: slave.diagnosis.map(|diagnosis| diagnosis.alarm),
+        warning: slave.diagnosis.map(|diagnosis| diagnosis.warning),
+        connection: word(slave.state),
+        polls_per_second: slave.answers_per_second,
+        cycle_ms: cycle_ms(slave),
     }
 }

@@ -2,9 +2,9 @@
 
 use std::io::{self, Write};
 
-use codewheel_plant::{BusSnapshot, DeviceSnapshot};
+use codewheel_plant::{BusSnapshot, DeviceSnapshot, SlaveSnapshot};
 
-use super::{Show, connection, cycle_ms, fresh, lamp};
+use super::{Show, connection, cycle_ms, fresh, lamp, strangers, word};
 
 pub(super) struct Lines {
     names_buses: bool,
@@ -21,9 +21,12 @@ impl Show for Lines {
     fn draw(&mut self, newest: &[Option<BusSnapshot>], places: &[usize]) -> io::Result<()> {
         let mut out = io::stdout().lock();
         for bus in fresh(newest, places) {
+            let name = if self.names_buses { format!("bus {} ", bus.name) } else { "".into() };
             for device in &bus.devices {
-                let name = if self.names_buses { format!("bus {} ", bus.name) } else { "".into() };
                 writeln!(out, "{} {name}{}", bus.at, line(device))?;
+            }
+            for (address, slave) in strangers(bus) {
+                writeln!(out, "{} {name}{}", bus.at, stranger(*address, slave))?;
             }
         }
         out.flush()
@@ -43,8 +46,18 @@ fn line(device: &DeviceSnapshot) -> String {
     }
     let lamp = lamp(device).replace(' ', "-");
     line.push_str(&format!(" led {lamp} connection {}", connection(device)));
-    if let (Some(master), Some(cycle)) = (&device.master, cycle_ms(device)) {
-        line.push_str(&format!(" polls/s {:.0} cycle {cycle:.3} ms", master.answers_per_second));
+    if let Some(master) = &device.master {
+        line.push_str(&seen(master));
     }
     line
+}
+
+/// A slave that is no device of this plant.
+fn stranger(address: u8, slave: &SlaveSnapshot) -> String {
+    let position = slave.position.map_or(String::new(), |position| format!(" position {position}"));
+    format!("address {address}{position} connection {}{}", word(slave.state), seen(slave))
+}
+
+fn seen(slave: &SlaveSnapshot) -> String {
+    format!(" polls/s {:.0} cycle {:.3} ms", slave.answers_per_second, cycle_ms(slave))
 }

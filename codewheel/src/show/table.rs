@@ -3,11 +3,11 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use codewheel_plant::{BusSnapshot, DeviceSnapshot};
+use codewheel_plant::{BusSnapshot, DeviceSnapshot, SlaveSnapshot};
 use comfy_table::{Table, presets};
 use crossterm::{cursor, execute, queue, terminal};
 
-use super::{Show, connection, cycle_ms, lamp, rpm};
+use super::{Show, connection, cycle_ms, lamp, rpm, strangers, word};
 
 /// How often the table is drawn anew.
 const PERIOD: Duration = Duration::from_millis(200);
@@ -85,6 +85,10 @@ fn text(newest: &[Option<BusSnapshot>], names_buses: bool) -> String {
             let name = names_buses.then(|| bus.name.clone());
             table.add_row(name.into_iter().chain(cells(device)));
         }
+        for (address, slave) in strangers(bus) {
+            let name = names_buses.then(|| bus.name.clone());
+            table.add_row(name.into_iter().chain(stranger(*address, slave)));
+        }
         let load =
             bus.load.map_or(String::new(), |load| format!(" · bus load {:>4.1} %", load * 100.0));
         let at = bus.at.as_nanos() as f64 / 1e9;
@@ -113,6 +117,22 @@ fn cells(device: &DeviceSnapshot) -> [String; 9] {
             .master
             .as_ref()
             .map_or_else(unknown, |master| format!("{:>5.0}", master.answers_per_second)),
-        cycle_ms(device).map_or_else(unknown, |cycle| format!("{cycle:.3} ms")),
+        device.master.as_ref().map_or_else(unknown, |slave| format!("{:.3} ms", cycle_ms(slave))),
+    ]
+}
+
+/// A slave that is no device of this plant.
+fn stranger(address: u8, slave: &SlaveSnapshot) -> [String; 9] {
+    let unknown = || "–".to_owned();
+    [
+        address.to_string(),
+        unknown(),
+        slave.position.map_or_else(unknown, |position| format!("{position:>9}")),
+        unknown(),
+        unknown(),
+        unknown(),
+        format!("{:<11}", word(slave.state)),
+        format!("{:>5.0}", slave.answers_per_second),
+        format!("{:.3} ms", cycle_ms(slave)),
     ]
 }

@@ -81,6 +81,19 @@ fn a_damaged_memory_is_set_aside_reported_and_never_lost() {
 }
 
 #[test]
+fn a_fault_of_the_command_line_happens_at_its_time() {
+    let faults = ["--fault", "jump steps=4000 at=100ms", "--fault", "power-cut at=300ms for=1ms"];
+    let more = [&["--shaft", "turn rpm=1"], &faults[..]].concat();
+    let (mut encoder, _) = Running::encoder("amg11-d29", &more);
+    let mut messages = vec![encoder.message(), encoder.message()];
+    assert!(messages[0].ends_with("fault: the code jumps by 4000 steps"), "{messages:?}");
+    assert!(messages[1].ends_with("position error: the code jumped"), "{messages:?}");
+    messages = vec![encoder.message(), encoder.message()];
+    assert!(messages[0].ends_with("fault: the power is cut for 1ms"), "{messages:?}");
+    assert!(messages[1].ends_with("fault over: the power is cut for 1ms"), "{messages:?}");
+}
+
+#[test]
 fn garbage_from_one_client_disturbs_no_other() {
     let (_encoder, address) = Running::encoder("hmg10-d13", &[]);
     let mut client = Client::connect(&address);

@@ -2,6 +2,8 @@
 
 mod demo;
 mod encoder;
+#[cfg(unix)]
+mod profibus;
 mod prompt;
 mod refusals;
 mod run;

@@ -42,8 +42,13 @@ fn the_demo_from_its_file_is_polled_and_ends_after_its_time() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let text = stdout(&output);
     assert!(text.lines().count() >= 9, "{text}");
-    let last: Vec<_> = text.lines().rev().take(3).collect();
-    assert!(last.iter().all(|line| line.contains("connection polled")), "{text}");
+    for (bus, connection) in
+        [("bus demo ", "connection polled"), ("bus field ", "connection data-exch")]
+    {
+        let lines = text.lines().rev().filter(|line| line.contains(bus));
+        let last: Vec<_> = lines.take(3).collect();
+        assert!(last.len() == 3 && last.iter().all(|line| line.contains(connection)), "{text}");
+    }
 }
 
 #[test]
@@ -54,6 +59,48 @@ fn the_fault_plant_runs_and_says_on_stderr_what_goes_wrong() {
     assert!(messages.contains("trouble: sensor: position error: the code jumped"), "{messages}");
     assert!(messages.contains("trouble: controller: bus-off: silent"), "{messages}");
     assert!(!messages.contains("allocated"), "that is for --verbose: {messages}");
+}
+
+#[test]
+fn the_profibus_fault_plant_says_on_stderr_what_goes_wrong() {
+    let output = run(&example("profibus-faults.toml"), &["--for", "4s"]);
+    assert_eq!(output.status.code(), Some(0));
+    let messages = stderr(&output);
+    for part in [
+        "refuses: parameters refused: Set_Prm octets 14–17: total resolution 536870912 exceeds \
+         3600 × 65536 = 235929600",
+        "sensor: position error: the code jumped",
+        "converter: the SSI data line stays high",
+    ] {
+        assert!(messages.contains(part), "lacks {part:?}: {messages}");
+    }
+    assert!(messages.lines().count() < 30, "no flood: {messages}");
+}
+
+#[test]
+fn a_plant_that_is_only_a_master_shows_the_slaves_it_serves() {
+    let bus = ["encoder", "hmg10-p13", "--bus", "rs485-listen:127.0.0.1:0", "--address", "7"];
+    let mut encoder = Running::start(&[&bus[..], &["--shaft", "still angle=4711"]].concat());
+    let line = encoder.line();
+    let address = line.rsplit_once(" on rs485-listen:").expect("ready").1;
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plant.toml");
+    let text = format!(
+        "[[bus]]\nname = \"b\"\nkind = \"profibus\"\nuri = \"rs485:{address}\"\n\
+         [[master]]\naddress = 2\nslave = [{{ address = 7, scaling = false }}]\n"
+    );
+    std::fs::write(&path, text).expect("written");
+    let output = run(&path, &["--for", "3s"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let text = stdout(&output);
+    let line = text.lines().last().unwrap_or_default();
+    assert!(line.contains("address 7 position 4711 connection running polls/s "), "{text}");
+    let output = run(&path, &["--for", "3s", "--json"]);
+    let text = stdout(&output);
+    let lines: Vec<Value> =
+        text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let last = lines.iter().rfind(|line| line["address"] == 7).expect("the slave");
+    assert_eq!((&last["position"], &last["alarm"]), (&4_711.into(), &false.into()));
 }
 
 #[test]
@@ -104,7 +151,19 @@ fn json_is_one_object_a_line_with_what_the_table_shows() {
     let text = stdout(&output);
     let lines: Vec<Value> =
         text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
-    let last = lines.last().expect("a line");
+    let last_of = |bus| {
+        let of_device = |line: &&Value| line["bus"] == bus && line["device"].is_string();
+        lines.iter().rfind(of_device).expect("a line")
+    };
+    for (key, value) in [
+        ("address", Value::from(23)),
+        ("product", "HEAG 162 SP 18".into()),
+        ("connection", "data-exch".into()),
+        ("lamp", "green".into()),
+    ] {
+        assert_eq!(last_of("field")[key], value, "{key}");
+    }
+    let last = last_of("demo");
     for (key, value) in [
         ("bus", Value::from("demo")),
         ("address", 12.into()),
@@ -124,7 +183,8 @@ fn json_is_one_object_a_line_with_what_the_table_shows() {
 #[test]
 fn the_printed_config_is_complete_and_prints_itself() {
     let (folder, path) = commissioning();
-    for file in [example("demo.toml"), example("faults.toml"), path] {
+    let examples = ["demo.toml", "faults.toml", "profibus.toml", "profibus-faults.toml"];
+    for file in examples.map(example).into_iter().chain([path]) {
         let output = run(&file, &["--print-config"]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         let printed = folder.path().join("printed.toml");
@@ -186,14 +246,15 @@ fn whoever_stops_reading_ends_the_program_quietly() {
     running.close_stdout();
     let (status, messages) = running.end();
     assert_eq!(status.code(), Some(0), "{messages}");
-    assert_eq!(messages.lines().count(), 1, "{messages}");
+    assert_eq!(messages.lines().count(), 2, "{messages}");
 
     let encoder = ["encoder", "amg11-d29", "--bus", "slcan-listen:127.0.0.1:0", "--address", "5"];
     let demo = example("demo.toml");
     let print = ["run", demo.to_str().expect("text"), "--print-config"];
     let describe = ["describe", "amg11-d29"];
-    let all: [&[&str]; 6] =
-        [&["schema"], &["models"], &["models", "--json"], &describe, &print, &encoder];
+    let field = ["describe", "amg11-p29"];
+    let all: [&[&str]; 7] =
+        [&["schema"], &["models"], &["models", "--json"], &describe, &field, &print, &encoder];
     for arguments in all {
         let (reader, writer) = std::io::pipe().expect("a pipe");
         drop(reader);

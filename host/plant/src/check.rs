@@ -4,25 +4,79 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use codewheel_device::{Product, Switches, product};
-use codewheel_devicenet::MacId;
-use codewheel_devicenet::scanner::Trigger;
-use codewheel_link::BusUri;
-use codewheel_sim::can::Faults;
+use codewheel_device::Product;
+use codewheel_link::{BusUri, Medium};
 use codewheel_sim::shaft::Shaft;
-use codewheel_station::Duration;
-use codewheel_station::can::BitRate;
 use toml::Spanned;
 
 use crate::complaint::line_of;
-use crate::file::{
-    BusTable, Connection, DeviceTable, MasterTable, PlantFile, SlaveTable, SwitchTable,
-    SwitchesValue,
-};
-use crate::plant::default_name;
-use crate::{BusPlan, Complaint, DevicePlan, Exchange, MasterPlan, Plant, SlavePlan, TimeSpan};
+use crate::field_bus::{FieldBus, PlannedMaster, Switches};
+use crate::file::{BusKind, BusTable, DeviceTable, MasterKind, MasterTable, PlantFile};
+use crate::plant::{any_bus, default_name};
+use crate::{AnyBusPlan, BusPlan, Complaint, DevicePlan, Plant};
 
+mod devicenet;
 mod faults;
+mod profibus;
+mod ssi;
+
+pub(crate) use faults::fault_of_words;
+pub(crate) use profibus::baud_rate;
+pub(crate) use ssi::sensor_of_keys;
+
+/// What the tables of one field bus mean.
+trait Written: FieldBus {
+    /// What carries it.
+    const MEDIUM: Medium;
+    /// The kind that plant files call its masters.
+    const MASTER: MasterKind;
+    /// Its rates as people write them, in words for a message.
+    const RATES: &'static str;
+    /// The rate where nothing is said.
+    const DEFAULT_RATE: Self::Rate;
+
+    /// A rate as people write it.
+    fn rate(text: &str) -> Option<Self::Rate>;
+
+    /// Cable and faults of a bus.
+    fn line(
+        source: &Source<'_>,
+        table: &BusTable,
+        bus: &mut BusPlan<Self>,
+    ) -> Result<(), Complaint>;
+
+    /// Where the switches of a device stand.
+    fn switches(
+        source: &Source<'_>,
+        table: &DeviceTable,
+        bus: &BusPlan<Self>,
+    ) -> Result<Self::Switches, Complaint>;
+
+    /// What else a device is told.
+    fn options(
+        source: &Source<'_>,
+        table: &DeviceTable,
+        bus: &BusPlan<Self>,
+    ) -> Result<Self::Options, Complaint>;
+
+    /// A master.
+    fn master_plan(
+        source: &Source<'_>,
+        table: &MasterTable,
+        bus: &BusPlan<Self>,
+    ) -> Result<Self::MasterPlan, Complaint>;
+}
+
+/// A key and where its value stands, if it is there.
+type Given = (&'static str, Option<Range<usize>>);
+
+fn span<T>(value: &Option<Spanned<T>>) -> Option<Range<usize>> {
+    value.as_ref().map(Spanned::span)
+}
+
+fn is_true(value: &Option<Spanned<bool>>) -> bool {
+    value.as_ref().is_some_and(|value| *value.get_ref())
+}
 
 /// The plant that `text` describes.
 pub(crate) fn check(text: &str, name: &str, folder: &Path) -> Result<Plant, Complaint> {
@@ -33,19 +87,22 @@ pub(crate) fn check(text: &str, name: &str, folder: &Path) -> Result<Plant, Comp
         let at = error.span().unwrap_or(0..0);
         source.complaint(at, in_our_words(error.message()))
     })?;
-    let mut buses: Vec<BusPlan> = Vec::new();
+    let mut buses: Vec<AnyBusPlan> = Vec::new();
     let mut uris = BTreeMap::new();
     for table in &file.bus {
-        let bus = source.bus(table)?;
+        let bus = match table.kind {
+            BusKind::DeviceNet => AnyBusPlan::DeviceNet(source.bus(table)?),
+            BusKind::Profibus => AnyBusPlan::Profibus(source.bus(table)?),
+        };
         let at = table.name.span();
-        if buses.iter().any(|other| other.name == bus.name) {
-            return Err(source.complaint(at, format!("there is a bus {:?} already", bus.name)));
+        if buses.iter().any(|other| other.name() == bus.name()) {
+            return Err(source.complaint(at, format!("there is a bus {:?} already", bus.name())));
         }
         // Port 0 is any free one, so it can be taken many times.
-        let uri = bus.uri.to_string();
+        let uri = bus.uri().to_string();
         let shared = !uri.ends_with(":0") && uris.insert(uri.clone(), ()).is_some();
         if shared {
-            let at = table.uri.as_ref().map_or(at, Spanned::span);
+            let at = span(&table.uri).unwrap_or(at);
             return Err(source.complaint(at, format!("another bus is at {uri} already")));
         }
         buses.push(bus);
@@ -54,32 +111,13 @@ pub(crate) fn check(text: &str, name: &str, folder: &Path) -> Result<Plant, Comp
     let mut memories = BTreeMap::new();
     for table in &file.device {
         let place = source.bus_of(&buses, table.bus.as_ref(), &table.model)?;
-        let device = source.device(table, &buses[place])?;
-        let at = table.address.as_ref().map(Spanned::span);
-        let at = at.or_else(|| table.switches.as_ref().map(Spanned::span)).unwrap_or(0..0);
-        if let Some(mac) = device.switches.mac() {
-            source.take_address(&mut stations, place, mac, at, table.duplicate.as_ref())?;
-        } else if let Some(duplicate) = &table.duplicate {
-            let message = "duplicate means nothing here: the switches give no address";
-            return Err(source.complaint(duplicate.span(), message.into()));
-        }
-        if let (Some(path), Some(memory)) = (&device.memory, &table.memory)
-            && let Some(line) = memories.insert(path.clone(), source.line(memory))
-        {
-            let message = format!(
-                "the device of line {line} has this memory file already: name one of its own for \
-                 each"
-            );
-            return Err(source.complaint(memory.span(), message));
-        }
-        buses[place].devices.push(device);
+        let stations = stations.entry(place).or_default();
+        any_bus!(&mut buses[place], bus => source.add_device(table, bus, stations, &mut memories)?);
     }
     for table in &file.master {
         let place = source.bus_of(&buses, table.bus.as_ref(), &table.address)?;
-        let master = source.master(table, &buses[place])?;
-        let at = table.address.span();
-        source.take_address(&mut stations, place, master.mac, at, table.duplicate.as_ref())?;
-        buses[place].masters.push(master);
+        let stations = stations.entry(place).or_default();
+        any_bus!(&mut buses[place], bus => source.add_master(table, bus, stations)?);
     }
     Ok(Plant { buses })
 }
@@ -112,8 +150,24 @@ fn in_our_words(message: &str) -> String {
         .replace("unknown variant", "unknown value")
 }
 
-/// The line of the first station at each address of each bus.
-type Stations = BTreeMap<(usize, u8), usize>;
+/// Keys whose values are text in a plant file, even where they look like a number.
+const TEXTS: [&str; 8] = ["kind", "at", "for", "delay", "line", "code", "clock", "monoflop"];
+
+/// Keys and values of a command line as a table of a plant file.
+fn toml_of<'a>(keys: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {
+    let line = |(key, value): (&str, &str)| {
+        let bare = value.parse::<f64>().is_ok() || value == "true";
+        if bare && !TEXTS.contains(&key) {
+            format!("{key} = {value}\n")
+        } else {
+            format!("{key} = {value:?}\n")
+        }
+    };
+    keys.into_iter().map(line).collect()
+}
+
+/// The line of the first station at each address, of each bus.
+type Stations = BTreeMap<usize, BTreeMap<u8, usize>>;
 
 #[derive(Clone, Copy)]
 struct Source<'a> {
@@ -131,7 +185,7 @@ impl Source<'_> {
         line_of(self.text, value.span().start)
     }
 
-    fn bus(&self, table: &BusTable) -> Result<BusPlan, Complaint> {
+    fn bus<B: Written>(&self, table: &BusTable) -> Result<BusPlan<B>, Complaint> {
         let name = table.name.get_ref();
         if name.is_empty() || name.contains(|letter: char| letter.is_whitespace()) {
             let message = format!("{name:?} is no name for a bus: it is one word");
@@ -144,28 +198,58 @@ impl Source<'_> {
                 .parse()
                 .map_err(|error| self.complaint(text.span(), format!("{error}")))?,
         };
-        if !matches!(uri, BusUri::Virtual(_)) {
-            let levers = [("loss", &table.loss), ("corruption", &table.corruption)];
-            for (key, value) in levers {
-                if let Some(value) = value {
+        if let Some(text) = &table.uri
+            && ![B::MEDIUM, Medium::Any].contains(&uri.medium())
+        {
+            let message = format!(
+                "{uri} carries {}, and a {} runs on {}: write virtual:NAME, {}",
+                uri.medium(),
+                B::BUS,
+                B::MEDIUM,
+                B::MEDIUM.forms()
+            );
+            return Err(self.complaint(text.span(), message));
+        }
+        let bit_rate = match &table.baud {
+            None => B::DEFAULT_RATE,
+            Some(text) => B::rate(text.get_ref()).ok_or_else(|| {
+                let message =
+                    format!("{:?} is no rate of a {}: it has {}", text.get_ref(), B::BUS, B::RATES);
+                self.complaint(text.span(), message)
+            })?,
+        };
+        let mut bus = BusPlan::new(name, uri, bit_rate);
+        bus.seed = table.seed.as_ref().map_or(0, |seed| *seed.get_ref());
+        if !bus.is_virtual() {
+            for (key, at) in [
+                ("loss", &table.loss),
+                ("corruption", &table.corruption),
+                ("broken", &table.broken),
+                ("flipped", &table.flipped),
+                ("pause", &table.pause),
+            ] {
+                if let Some(at) = span(at) {
                     let message = format!("{key} is for virtual buses: a real one fails by itself");
-                    return Err(self.complaint(value.span(), message));
+                    return Err(self.complaint(at, message));
                 }
             }
         }
-        let faults = Faults {
-            loss: self.probability(table.loss.as_ref())?.unwrap_or(0.0),
-            corruption: self.probability(table.corruption.as_ref())?.unwrap_or(0.0),
-        };
-        Ok(BusPlan {
-            name: name.clone(),
-            uri,
-            bit_rate: table.baud.into(),
-            faults,
-            seed: table.seed.as_ref().map_or(0, |seed| *seed.get_ref()),
-            devices: Vec::new(),
-            masters: Vec::new(),
-        })
+        B::line(self, table, &mut bus)?;
+        Ok(bus)
+    }
+
+    /// Refuses keys that mean nothing here.
+    fn refuse(
+        &self,
+        given: impl IntoIterator<Item = Given>,
+        because: &str,
+    ) -> Result<(), Complaint> {
+        match given.into_iter().find_map(|(key, at)| Some((key, at?))) {
+            Some((key, at)) => {
+                Err(self.complaint(at, format!("`{key}` means nothing here: {because}")))
+            }
+            None => Ok(()),
+        }
     }
 
     fn probability(&self, value: Option<&Spanned<f64>>) -> Result<Option<f64>, Complaint> {
@@ -181,11 +265,11 @@ impl Source<'_> {
     /// The place of the bus that a table names, or of the only one there is.
     fn bus_of<T>(
         &self,
-        buses: &[BusPlan],
+        buses: &[AnyBusPlan],
         name: Option<&Spanned<String>>,
         instead: &Spanned<T>,
     ) -> Result<usize, Complaint> {
-        let names: Vec<_> = buses.iter().map(|bus| bus.name.as_str()).collect();
+        let names: Vec<_> = buses.iter().map(AnyBusPlan::name).collect();
         let defined = match names.as_slice() {
             [] => "the file defines no [[bus]]".to_owned(),
             names => format!("the file defines {}", names.join(", ")),
@@ -203,48 +287,96 @@ impl Source<'_> {
         }
     }
 
-    fn mac(&self, address: &Spanned<i64>, hint: &str) -> Result<MacId, Complaint> {
-        u8::try_from(*address.get_ref()).ok().and_then(MacId::new).ok_or_else(|| {
-            let message = format!("{} is no address: DeviceNet has 0–63{hint}", address.get_ref());
-            self.complaint(address.span(), message)
+    fn add_device<B: Written>(
+        &self,
+        table: &DeviceTable,
+        bus: &mut BusPlan<B>,
+        stations: &mut BTreeMap<u8, usize>,
+        memories: &mut BTreeMap<PathBuf, usize>,
+    ) -> Result<(), Complaint> {
+        let device = self.device(table, bus)?;
+        let at = span(&table.address).or_else(|| span(&table.switches)).unwrap_or(0..0);
+        if let Some(address) = device.switches.address() {
+            self.take_address(stations, address, at, table.duplicate.as_ref())?;
+        } else if let Some(duplicate) = &table.duplicate {
+            let message = "duplicate means nothing here: the switches give no address";
+            return Err(self.complaint(duplicate.span(), message.into()));
+        }
+        if let (Some(path), Some(memory)) = (&device.memory, &table.memory)
+            && let Some(line) = memories.insert(path.clone(), self.line(memory))
+        {
+            let message = format!(
+                "the device of line {line} has this memory file already: name one of its own for \
+                 each"
+            );
+            return Err(self.complaint(memory.span(), message));
+        }
+        bus.devices.push(device);
+        Ok(())
+    }
+
+    fn device<B: Written>(
+        &self,
+        table: &DeviceTable,
+        bus: &BusPlan<B>,
+    ) -> Result<DevicePlan<B>, Complaint> {
+        let product = self.product(&table.model, bus)?;
+        let switches = B::switches(self, table, bus)?;
+        let options = B::options(self, table, bus)?;
+        let sensor = self.sensor(table, product)?;
+        let geometry = sensor.geometry().unwrap_or(product.encoder.geometry);
+        let shaft_text = table.shaft.as_ref().map_or("still", |shaft| shaft.get_ref());
+        let shaft_text = Shaft::text_in_folder(shaft_text, self.folder);
+        let shaft =
+            Shaft::parse(&shaft_text, geometry.singleturn_resolution(), geometry.revolutions())
+                .map_err(|error| {
+                    self.complaint(span(&table.shaft).unwrap_or(0..0), error.to_string())
+                })?;
+        let name = table.name.clone();
+        // Where there is a memory it may know a serial number, which only one that is given beats.
+        let serial = table.memory.is_none().then(|| u32::from(switches.position()));
+        Ok(DevicePlan {
+            name: name.unwrap_or_else(|| default_name(product.model, switches.position())),
+            product,
+            switches,
+            options,
+            shaft,
+            shaft_text,
+            faults: self.faults(&table.fault, product, &sensor, bus)?,
+            sensor,
+            memory: table.memory.as_ref().map(|memory| self.path(memory.get_ref())),
+            serial: table.serial.or(serial),
+            duplicate: is_true(&table.duplicate),
         })
     }
 
-    fn device(&self, table: &DeviceTable, bus: &BusPlan) -> Result<DevicePlan, Complaint> {
-        let model = &table.model;
-        let product = Product::find(model.get_ref()).ok_or_else(|| {
-            let models: Vec<_> = product::DEVICENET.iter().map(|product| product.model).collect();
-            let message = format!(
+    fn product<B: Written>(
+        &self,
+        model: &Spanned<String>,
+        bus: &BusPlan<B>,
+    ) -> Result<&'static Product, Complaint> {
+        let found = Product::find(model.get_ref());
+        if let Some(product) = found.filter(|product| product.bus == B::BUS) {
+            return Ok(product);
+        }
+        let models = Product::all().filter(|product| product.bus == B::BUS);
+        let models: Vec<_> = models.map(|product| product.model).collect();
+        let message = match found {
+            None => format!(
                 "there is no model {:?}: the models are {}",
                 model.get_ref(),
                 models.join(", ")
-            );
-            self.complaint(model.span(), message)
-        })?;
-        let mut switches = self.switches(table, bus.bit_rate)?;
-        switches.termination = table.termination;
-        let text = table.shaft.as_ref().map_or("still", |text| text.get_ref());
-        let shaft_text = Shaft::text_in_folder(text, self.folder);
-        let geometry = product.encoder.geometry;
-        let (steps, turns) = (geometry.singleturn_resolution(), geometry.revolutions());
-        let shaft = Shaft::parse(&shaft_text, steps, turns).map_err(|error| {
-            let at = table.shaft.as_ref().map_or(0..0, Spanned::span);
-            self.complaint(at, error.to_string())
-        })?;
-        let name = table.name.clone();
-        // Where there is a memory it may know a serial number, which only one that is given beats.
-        let serial = table.memory.is_none().then(|| u32::from(switches.address()));
-        Ok(DevicePlan {
-            name: name.unwrap_or_else(|| default_name(product.model, switches.address())),
-            product,
-            switches,
-            shaft,
-            shaft_text,
-            memory: table.memory.as_ref().map(|memory| self.path(memory.get_ref())),
-            serial: table.serial.or(serial),
-            duplicate: table.duplicate.as_ref().is_some_and(|duplicate| *duplicate.get_ref()),
-            faults: self.faults(&table.fault, product, &bus.uri)?,
-        })
+            ),
+            Some(product) => format!(
+                "{} speaks {}, and {} is a {}: its models are {}",
+                product.model,
+                product.bus,
+                bus.name,
+                B::BUS,
+                models.join(", ")
+            ),
+        };
+        Err(self.complaint(model.span(), message))
     }
 
     /// A path, the same for the same file however it is written.
@@ -252,185 +384,70 @@ impl Source<'_> {
         self.folder.join(path).components().collect()
     }
 
-    fn switches(&self, table: &DeviceTable, rate: BitRate) -> Result<Switches, Complaint> {
-        let value = match (&table.address, &table.switches) {
-            (Some(address), None) => {
-                let hint = ", and switches = 99 is how to simulate wrong switches";
-                let mac = self.mac(address, hint)?;
-                return Ok(Switches::set_to(mac.value(), rate));
-            }
-            (None, Some(value)) => value,
-            (None, None) => {
-                let message = "missing key `address` (or `switches`)".to_owned();
-                return Err(self.complaint(table.model.span(), message));
-            }
-            (Some(_), Some(switches)) => {
-                let message = "address says where the switches stand already: give one of the two";
-                return Err(self.complaint(switches.span(), message.into()));
-            }
-        };
-        let SwitchTable { rotary: [rotary_1, rotary_2], dip } = match *value.get_ref() {
-            SwitchesValue::Number(number) => return Ok(Switches::set_to(number, rate)),
-            SwitchesValue::Each(table) => table,
-        };
-        if rotary_1 > 9 || rotary_2 > 9 {
-            let message = "a rotary switch stands at 0 to 9".to_owned();
-            return Err(self.complaint(value.span(), message));
-        }
-        let mut switches = Switches::set_to(rotary_1 * 10 + rotary_2, rate);
-        if let Some([_, dip_2, dip_3]) = dip {
-            (switches.dip_2, switches.dip_3) = (dip_2, dip_3);
-        }
-        if switches.bit_rate() != rate {
-            let message = format!(
-                "the DIP switches say {}, and the bus runs at {rate}: one wire carries one rate",
-                switches.bit_rate()
-            );
-            return Err(self.complaint(value.span(), message));
-        }
-        Ok(switches)
-    }
-
     /// Notes a station at an address; a second one needs to say that it is meant.
     fn take_address(
         &self,
-        stations: &mut Stations,
-        bus: usize,
-        mac: MacId,
+        stations: &mut BTreeMap<u8, usize>,
+        address: u8,
         at: Range<usize>,
         duplicate: Option<&Spanned<bool>>,
     ) -> Result<(), Complaint> {
         let meant = duplicate.filter(|duplicate| *duplicate.get_ref());
         let line = line_of(self.text, at.start);
-        match (stations.get(&(bus, mac.value())), meant) {
+        match (stations.get(&address), meant) {
             (Some(first), None) => Err(self.complaint(
                 at,
                 format!(
-                    "the station of line {first} has address {mac} on this bus already; \
+                    "the station of line {first} has address {address} on this bus already; \
                      duplicate = true is how to simulate that"
                 ),
             )),
             (None, Some(duplicate)) => Err(self.complaint(
                 duplicate.span(),
-                format!("duplicate means nothing here: no station before has address {mac}"),
+                format!("duplicate means nothing here: no station before has address {address}"),
             )),
             (Some(_), Some(_)) => Ok(()),
             (None, None) => {
-                stations.insert((bus, mac.value()), line);
+                stations.insert(address, line);
                 Ok(())
             }
         }
     }
 
-    fn master(&self, table: &MasterTable, bus: &BusPlan) -> Result<MasterPlan, Complaint> {
-        let mac = self.mac(&table.address, "")?;
-        let mut slaves: Vec<SlavePlan> = Vec::new();
-        match &table.slave {
-            Some(tables) => {
-                for table in tables {
-                    let slave = self.slave(table)?;
-                    let taken = slaves.iter().any(|other| other.mac == slave.mac);
-                    if taken || slave.mac == mac {
-                        let message = if taken {
-                            "this address is in the scan list already"
-                        } else {
-                            "this is the master's own address"
-                        };
-                        return Err(self.complaint(table.address.span(), message.into()));
-                    }
-                    slaves.push(slave);
-                }
-            }
-            None => {
-                for mac in bus.devices.iter().filter_map(|device| device.switches.mac()) {
-                    if !slaves.iter().any(|slave| slave.mac == mac) {
-                        slaves.push(SlavePlan::poll(mac));
-                    }
-                }
-                slaves.retain(|slave| slave.mac != mac);
-            }
+    fn add_master<B: Written>(
+        &self,
+        table: &MasterTable,
+        bus: &mut BusPlan<B>,
+        stations: &mut BTreeMap<u8, usize>,
+    ) -> Result<(), Complaint> {
+        if let Some(kind) = table.kind.as_ref().filter(|kind| *kind.get_ref() != B::MASTER) {
+            let message = format!(
+                "{} is a {}: its masters are of kind {:?}",
+                bus.name,
+                B::BUS,
+                B::MasterPlan::KIND
+            );
+            return Err(self.complaint(kind.span(), message));
         }
-        let name = table.name.clone();
-        let time = |value: Option<crate::TimeSpan>, default| value.map_or(default, |time| time.0);
-        Ok(MasterPlan {
-            name: name.unwrap_or_else(|| default_name("scanner", mac.value())),
-            mac,
-            interval: time(table.interval, Duration::from_millis(10)),
-            interscan_delay: time(table.interscan_delay, Duration::ZERO),
-            termination: table.termination.unwrap_or(true),
-            duplicate: table.duplicate.as_ref().is_some_and(|duplicate| *duplicate.get_ref()),
-            slaves,
-        })
+        let master = B::master_plan(self, table, bus)?;
+        let at = table.address.span();
+        self.take_address(stations, master.address(), at, table.duplicate.as_ref())?;
+        bus.masters.push(master);
+        Ok(())
     }
 
-    /// A timer of a connection: two octets of milliseconds.
-    fn rate(&self, value: &Spanned<TimeSpan>, name: &str) -> Result<u16, Complaint> {
-        let time = value.get_ref().0;
-        let millis = u16::try_from(time.as_millis()).ok();
-        millis.filter(|_| time == Duration::from_millis(time.as_millis())).ok_or_else(|| {
-            let given = value.get_ref();
-            let message =
-                format!("{given} is no {name}: it is 0 to 65535ms, in whole milliseconds");
-            self.complaint(value.span(), message)
-        })
-    }
-
-    fn exchange(&self, table: &SlaveTable, rate: u16) -> Result<Exchange, Complaint> {
-        let trigger = match table.connection {
-            Connection::ChangeOfState => Trigger::ChangeOfState,
-            Connection::Cyclic => Trigger::Cyclic,
-            Connection::Poll | Connection::Explicit => {
-                let spans = [
-                    table.acknowledged.as_ref().map(Spanned::span),
-                    table.production_inhibit.as_ref().map(Spanned::span),
-                ];
-                if let Some(span) = spans.into_iter().flatten().next() {
-                    let message = "only a change-of-state or cyclic connection has this";
-                    return Err(self.complaint(span, message.into()));
-                }
-                return Ok(match table.connection {
-                    Connection::Explicit => Exchange::Explicit,
-                    _ => Exchange::Poll,
-                });
-            }
+    /// Refuses an address that is in a list already, or the master's own.
+    fn new_slave(
+        &self,
+        address: &Spanned<i64>,
+        taken: bool,
+        is_own: bool,
+    ) -> Result<(), Complaint> {
+        let message = match (taken, is_own) {
+            (true, _) => "this address is in the scan list already",
+            (_, true) => "this is the master's own address",
+            (false, false) => return Ok(()),
         };
-        let production_inhibit = match &table.production_inhibit {
-            None => 0,
-            Some(inhibit) => {
-                let millis = self.rate(inhibit, "production inhibit time")?;
-                if rate != 0 && millis > rate {
-                    let message = format!("it is longer than the expected packet rate, {rate}ms");
-                    return Err(self.complaint(inhibit.span(), message));
-                }
-                millis
-            }
-        };
-        let acknowledged = table.acknowledged.as_ref().is_none_or(|value| *value.get_ref());
-        Ok(Exchange::Change { trigger, acknowledged, production_inhibit })
-    }
-
-    fn slave(&self, table: &SlaveTable) -> Result<SlavePlan, Complaint> {
-        let mut slave = SlavePlan::poll(self.mac(&table.address, "")?);
-        if table.connection == Connection::ChangeOfState {
-            slave.expected_packet_rate = 1_000;
-        }
-        if let Some(rate) = &table.expected_packet_rate {
-            slave.expected_packet_rate = self.rate(rate, "expected packet rate")?;
-            if table.connection == Connection::Cyclic && slave.expected_packet_rate == 0 {
-                let message = "a cyclic slave needs an expected packet rate of at least 1ms";
-                return Err(self.complaint(rate.span(), message.into()));
-            }
-        }
-        slave.exchange = self.exchange(table, slave.expected_packet_rate)?;
-        slave.assembly = table.assembly;
-        slave.identity = match (&table.vendor, &table.product_code) {
-            (None, None) => None,
-            (Some(vendor), Some(code)) => Some((*vendor.get_ref(), *code.get_ref())),
-            (Some(one), None) | (None, Some(one)) => {
-                let message = "vendor and product_code are given together or not at all";
-                return Err(self.complaint(one.span(), message.into()));
-            }
-        };
-        Ok(slave)
+        Err(self.complaint(address.span(), message.into()))
     }
 }

@@ -1,164 +1,92 @@
 //! Who is on a bus, whatever the bus is: devices, masters, what is done to them and what they show.
 
-use codewheel_device::{Product, Snapshot};
-use codewheel_devicenet::MacId;
-use codewheel_devicenet::scanner::{
-    ChangeSettings, CycleTimes, DeviceIdentity, PollSettings, Scanner, ScannerIdentity,
-    SlaveSettings, SlaveState,
-};
-use codewheel_link::BusUri;
-use codewheel_station::can::{BitRate, Filter, Frame, Input};
+use std::collections::BTreeMap;
+
+use codewheel_device::Product;
 use codewheel_station::{Instant, Station};
 
 use crate::device::Device;
 use crate::fault::{Action, Agenda, Lever};
-use crate::keeper::Keeper;
+use crate::field_bus::{FieldBus, PlannedMaster, Switches, Talker, Told};
+use crate::manned::Manned;
 use crate::report::{Report, What};
-use crate::{BusPlan, Exchange, MasterPlan, MemoryError, SlavePlan};
+use crate::snapshot::{BusSnapshot, DeviceSnapshot, MasterSnapshot, SlaveSnapshot};
 
-/// A bus at one moment.
-#[derive(Clone, Debug)]
-pub struct BusSnapshot {
-    /// Its name.
-    pub name: String,
-    /// Where it is, with the port it really got.
-    pub uri: String,
-    /// Its bit rate.
-    pub bit_rate: BitRate,
-    /// When, from the start of the plant.
-    pub at: Instant,
-    /// The share of the time since the snapshot before in which the wire was not idle, 0 … 1;
-    /// `None` where nobody can tell.
-    pub load: Option<f64>,
-    /// Its masters.
-    pub masters: Vec<MasterSnapshot>,
-    /// Its devices, by address.
-    pub devices: Vec<DeviceSnapshot>,
-    /// What happened on the bus itself since the snapshot before.
-    pub reports: Vec<Report>,
-}
-
-/// A master at one moment.
-#[derive(Clone, Debug)]
-pub struct MasterSnapshot {
-    /// What messages call it.
-    pub name: String,
-    /// Its address.
-    pub mac: MacId,
-    /// Whether it is on-line.
-    pub on_line: bool,
-    /// Its poll cycles.
-    pub cycle: CycleTimes,
-}
-
-/// A device at one moment, seen from both sides of the bus.
-#[derive(Clone, Debug)]
-pub struct DeviceSnapshot {
-    /// What messages call it.
-    pub name: String,
-    /// What its address switches say, 0 … 99.
-    pub address: u8,
-    /// The product.
-    pub product: &'static Product,
-    /// The device itself; `None` while it has no power.
-    pub device: Option<Snapshot>,
-    /// Where it stands with the first master that has it in its scan list.
-    pub master: Option<SlaveSnapshot>,
-    /// What happened to it since the snapshot before.
-    pub reports: Vec<Report>,
-}
-
-/// A device as its master sees it.
-#[derive(Clone, Debug)]
-pub struct SlaveSnapshot {
-    /// Where it stands.
-    pub state: SlaveState,
-    /// The position as the master got it last; `None` before the first answer.
-    pub position: Option<u32>,
-    /// Answers a second since the snapshot before.
-    pub answers_per_second: f64,
-    /// The poll cycles of this master.
-    pub cycle: CycleTimes,
-}
-
-/// A station of a plant. A scanner is many times larger than an encoder, so both are boxed.
+/// A station of a plant. A master is many times larger than an encoder, so both are boxed.
 #[derive(Debug)]
-pub(crate) enum Member {
-    Device(Box<Device>),
-    Scanner(Box<Scanner>),
+pub enum Member<B: FieldBus> {
+    /// A device.
+    Device(Box<Device<B>>),
+    /// A master.
+    Master(Box<B::Master>),
 }
 
-impl Member {
-    pub(crate) fn filters(&self) -> Vec<Filter> {
-        match self {
-            Self::Device(device) => device.filters(),
-            Self::Scanner(scanner) => scanner.filters().to_vec(),
-        }
-    }
-
-    const fn device(&self) -> Option<&Device> {
+impl<B: FieldBus> Member<B> {
+    pub(crate) const fn device(&self) -> Option<&Device<B>> {
         match self {
             Self::Device(device) => Some(device),
-            Self::Scanner(_) => None,
+            Self::Master(_) => None,
         }
     }
 
-    const fn device_mut(&mut self) -> Option<&mut Device> {
+    const fn device_mut(&mut self) -> Option<&mut Device<B>> {
         match self {
             Self::Device(device) => Some(device),
-            Self::Scanner(_) => None,
+            Self::Master(_) => None,
         }
     }
 
-    const fn scanner(&self) -> Option<&Scanner> {
+    pub(crate) const fn master(&self) -> Option<&B::Master> {
         match self {
             Self::Device(_) => None,
-            Self::Scanner(scanner) => Some(scanner),
+            Self::Master(master) => Some(master),
         }
     }
 }
 
-impl Station for Member {
-    type Input<'a> = Input<'a>;
-    type Output = Frame;
+impl<B: FieldBus> Station for Member<B> {
+    type Input<'a> = B::Input<'a>;
+    type Output = B::Output;
 
-    fn handle(&mut self, now: Instant, input: Input<'_>) {
+    fn handle(&mut self, now: Instant, input: B::Input<'_>) {
         match self {
             Self::Device(device) => device.handle(now, input),
-            Self::Scanner(scanner) => scanner.handle(now, input),
+            Self::Master(master) => master.handle(now, input),
         }
     }
 
     fn advance(&mut self, now: Instant) {
         match self {
             Self::Device(device) => device.advance(now),
-            Self::Scanner(scanner) => scanner.advance(now),
+            Self::Master(master) => master.advance(now),
         }
     }
 
-    fn transmit(&mut self, now: Instant) -> Option<Frame> {
+    fn transmit(&mut self, now: Instant) -> Option<B::Output> {
         match self {
             Self::Device(device) => device.transmit(now),
-            Self::Scanner(scanner) => scanner.transmit(now),
+            Self::Master(master) => master.transmit(now),
         }
     }
 
     fn deadline(&self) -> Option<Instant> {
         match self {
             Self::Device(device) => device.deadline(),
-            Self::Scanner(scanner) => scanner.deadline(),
+            Self::Master(master) => master.deadline(),
         }
     }
 }
 
 /// What stations can be plugged into. Each has a place, devices first, then masters.
-pub(crate) trait Medium {
+pub trait Medium<B: FieldBus> {
     /// Plugs a station in and switches it on.
-    fn plug_in(&mut self, place: usize, station: Member);
+    fn plug_in(&mut self, place: usize, station: Member<B>);
     /// Switches a station off and unplugs it.
-    fn unplug(&mut self, place: usize) -> Option<Member>;
-    fn station(&self, place: usize) -> Option<&Member>;
-    fn station_mut(&mut self, place: usize) -> Option<&mut Member>;
+    fn unplug(&mut self, place: usize) -> Option<Member<B>>;
+    /// The station on a place.
+    fn station(&self, place: usize) -> Option<&Member<B>>;
+    /// The station on a place, to be changed.
+    fn station_mut(&mut self, place: usize) -> Option<&mut Member<B>>;
     /// Lets the controller of a station leave the bus for a while.
     fn bus_off(&mut self, place: usize, now: Instant);
     /// Destroys what a station sends, or no more.
@@ -167,11 +95,11 @@ pub(crate) trait Medium {
 
 /// Who is on a bus.
 #[derive(Debug)]
-pub(crate) struct Crew {
+pub(crate) struct Crew<B: FieldBus> {
     name: String,
-    bit_rate: BitRate,
-    devices: Vec<Hand>,
-    masters: Vec<MasterPlan>,
+    bit_rate: B::Rate,
+    devices: Vec<Hand<B>>,
+    masters: Vec<Chief<B>>,
     agenda: Agenda,
     /// Of the bus itself.
     reports: Vec<Report>,
@@ -180,85 +108,54 @@ pub(crate) struct Crew {
 
 /// A device of the crew.
 #[derive(Debug)]
-struct Hand {
+struct Hand<B: FieldBus> {
     name: String,
     address: u8,
     product: &'static Product,
     /// The device while it has no power.
-    unplugged: Option<Member>,
-    /// The first master that has it in its scan list.
-    master: Option<(usize, MacId)>,
-    /// Its answers at the snapshot before.
-    answers: u64,
+    unplugged: Option<Member<B>>,
+    /// The first master that serves it, and its address.
+    master: Option<(usize, u8)>,
 }
 
-/// A plan, and the memories of its devices, opened.
+/// A master of the crew.
 #[derive(Debug)]
-pub(crate) struct Manned {
-    pub(crate) plan: BusPlan,
-    memories: Vec<Keeper>,
-    reports: Vec<(usize, What)>,
+struct Chief<B: FieldBus> {
+    plan: B::MasterPlan,
+    /// The answers it had counted at the snapshot before, by the address of the slave.
+    answers: BTreeMap<u8, u64>,
 }
 
-impl Manned {
-    /// Opens the memories of all devices.
-    pub(crate) fn open(plan: BusPlan) -> Result<Self, MemoryError> {
-        let mut memories = Vec::new();
-        let mut reports = Vec::new();
-        for (place, device) in plan.devices.iter().enumerate() {
-            let (keeper, aside) = Keeper::open(device.memory.as_deref(), device.product)?;
-            memories.push(keeper);
-            reports.extend(aside.map(|path| (place, What::SetAside(path))));
-        }
-        Ok(Self { plan, memories, reports })
-    }
-
-    /// Writes memory files in threads.
-    pub(crate) fn in_threads(mut self, waker: &codewheel_link::Waker) -> Self {
-        let memories = self.memories.drain(..);
-        self.memories = memories.map(|keeper| keeper.in_thread(waker.clone())).collect();
-        self
-    }
-}
-
-impl Crew {
+impl<B: FieldBus> Crew<B> {
     /// Switches everything on, at time zero.
-    pub(crate) fn power_up(manned: Manned, medium: &mut impl Medium) -> Self {
-        let Manned { plan, memories, reports } = manned;
-        let BusPlan { name, bit_rate, seed, devices, masters, .. } = plan;
-        let agenda = Agenda::new(devices.iter().map(|device| device.faults.as_slice()));
+    pub(crate) fn power_up(manned: Manned<B>, medium: &mut impl Medium<B>) -> Self {
+        let Manned { plan, devices, masters } = manned;
+        let agenda = Agenda::new(plan.devices.iter().map(|device| device.faults.as_slice()));
         let mut hands = Vec::new();
-        for (place, (plan, keeper)) in devices.iter().zip(memories).enumerate() {
-            let mut device = Box::new(Device::new(plan, keeper, seed_at(seed, place)));
-            for (_, what) in reports.iter().filter(|(of, _)| *of == place) {
-                device.report(Instant::ZERO, what.clone());
-            }
+        for (place, (planned, mut device)) in plan.devices.iter().zip(devices).enumerate() {
             device.power_up(Instant::ZERO);
             medium.plug_in(place, Member::Device(device));
-            let mac = plan.switches.mac();
-            let master = mac.and_then(|mac| {
-                let has_it =
-                    |master: &MasterPlan| master.slaves.iter().any(|slave| slave.mac == mac);
-                Some((masters.iter().position(has_it)?, mac))
+            let master = planned.switches.address().and_then(|address| {
+                let serves = |master: &B::MasterPlan| master.serves(address);
+                Some((plan.masters.iter().position(serves)?, address))
             });
             hands.push(Hand {
-                name: plan.name.clone(),
-                address: plan.switches.address(),
-                product: plan.product,
+                name: planned.name.clone(),
+                address: planned.switches.position(),
+                product: planned.product,
                 unplugged: None,
                 master,
-                answers: 0,
             });
         }
-        for (place, plan) in masters.iter().enumerate() {
-            let member = Member::Scanner(Box::new(scanner(plan, place)));
-            medium.plug_in(hands.len() + place, member);
+        for (place, master) in masters.into_iter().enumerate() {
+            medium.plug_in(hands.len() + place, Member::Master(master));
         }
+        let chief = |plan| Chief { plan, answers: BTreeMap::new() };
         Self {
-            name,
-            bit_rate,
+            name: plan.name,
+            bit_rate: plan.bit_rate,
             devices: hands,
-            masters,
+            masters: plan.masters.into_iter().map(chief).collect(),
             agenda,
             reports: Vec::new(),
             seen_at: Instant::ZERO,
@@ -271,13 +168,13 @@ impl Crew {
     }
 
     /// Does what is due to the devices.
-    pub(crate) fn pull_levers(&mut self, now: Instant, medium: &mut impl Medium) {
+    pub(crate) fn pull_levers(&mut self, now: Instant, medium: &mut impl Medium<B>) {
         while let Some((place, action)) = self.agenda.take_due(now) {
             self.pull(now, place, action, medium);
         }
     }
 
-    fn pull(&mut self, now: Instant, place: usize, action: Action, medium: &mut impl Medium) {
+    fn pull(&mut self, now: Instant, place: usize, action: Action, medium: &mut impl Medium<B>) {
         let Some(hand) = self.devices.get_mut(place) else { return };
         match action {
             Action::Begin(Lever::PowerCut(_)) => {
@@ -302,7 +199,7 @@ impl Crew {
             Action::Begin(_) | Action::End(_) => {}
         }
         if let Some(device) = self.device_mut(place, medium) {
-            device.suffer(action);
+            device.suffer(now, action);
             let what = match action {
                 Action::Begin(lever) => What::FaultBegins(lever.to_string()),
                 Action::End(lever) => What::FaultEnds(lever.to_string()),
@@ -316,8 +213,20 @@ impl Crew {
         self.reports.push(Report { at, what });
     }
 
+    /// Hears what the masters have to tell.
+    fn listen(&mut self, medium: &mut impl Medium<B>) {
+        for (place, chief) in (self.devices.len()..).zip(&self.masters) {
+            let Some(Member::Master(master)) = medium.station_mut(place) else { continue };
+            while let Some(Told { at, text, trouble }) = master.take_event() {
+                let what = What::Master { name: chief.plan.name().to_owned(), text, trouble };
+                self.reports.push(Report { at, what });
+            }
+        }
+    }
+
     /// What the bus and its devices have reported, in order.
-    pub(crate) fn take_reports(&mut self, medium: &mut impl Medium) -> Vec<Report> {
+    pub(crate) fn take_reports(&mut self, medium: &mut impl Medium<B>) -> Vec<Report> {
+        self.listen(medium);
         let mut reports = std::mem::take(&mut self.reports);
         for place in 0..self.devices.len() {
             if let Some(device) = self.device_mut(place, medium) {
@@ -332,8 +241,8 @@ impl Crew {
     fn device_mut<'a>(
         &'a mut self,
         place: usize,
-        medium: &'a mut impl Medium,
-    ) -> Option<&'a mut Device> {
+        medium: &'a mut impl Medium<B>,
+    ) -> Option<&'a mut Device<B>> {
         let member = match &mut self.devices.get_mut(place)?.unplugged {
             Some(member) => Some(member),
             None => medium.station_mut(place),
@@ -347,25 +256,15 @@ impl Crew {
         at: Instant,
         uri: String,
         load: Option<f64>,
-        medium: &mut impl Medium,
+        medium: &mut impl Medium<B>,
     ) -> BusSnapshot {
-        let window = at.since(self.seen_at).as_nanos() as f64 / 1e9;
-        self.seen_at = at;
-        let count = self.devices.len();
-        let mut devices = Vec::with_capacity(count);
+        self.listen(medium);
+        let masters = self.master_snapshots(at, medium);
+        let mut devices = Vec::with_capacity(self.devices.len());
         for (place, hand) in self.devices.iter_mut().enumerate() {
-            let master = hand.master.and_then(|(master, mac)| {
-                let scanner = medium.station(count + master)?.scanner()?;
-                let slave = scanner.slave(mac)?;
-                let answers = slave.responses + slave.changes;
-                let fresh = answers.saturating_sub(hand.answers);
-                hand.answers = answers;
-                Some(SlaveSnapshot {
-                    state: slave.state,
-                    position: slave.latest().and_then(|(_, input)| position(input)),
-                    answers_per_second: if window > 0.0 { fresh as f64 / window } else { 0.0 },
-                    cycle: scanner.cycle_times(),
-                })
+            let master = hand.master.and_then(|(master, address)| {
+                let slaves = &masters.get(master)?.as_ref()?.slaves;
+                slaves.iter().find(|(of, _)| *of == address).map(|(_, slave)| *slave)
             });
             let member = match &mut hand.unplugged {
                 Some(member) => Some(member),
@@ -385,29 +284,57 @@ impl Crew {
             });
         }
         devices.sort_by_key(|device| device.address);
-        let masters = self.masters.iter().enumerate().filter_map(|(place, plan)| {
-            let scanner = medium.station(count + place)?.scanner()?;
-            Some(MasterSnapshot {
-                name: plan.name.clone(),
-                mac: plan.mac,
-                on_line: scanner.is_on_line(),
-                cycle: scanner.cycle_times(),
-            })
-        });
         BusSnapshot {
             name: self.name.clone(),
+            bus: B::BUS,
             uri,
-            bit_rate: self.bit_rate,
+            bit_rate: self.bit_rate.to_string(),
             at,
             load,
-            masters: masters.collect(),
+            masters: masters.into_iter().flatten().collect(),
             devices,
             reports: std::mem::take(&mut self.reports),
         }
     }
 
+    /// The masters now, each on its place.
+    fn master_snapshots(
+        &mut self,
+        at: Instant,
+        medium: &impl Medium<B>,
+    ) -> Vec<Option<MasterSnapshot>> {
+        let window = at.since(self.seen_at).as_nanos() as f64 / 1e9;
+        self.seen_at = at;
+        let count = self.devices.len();
+        let snapshot = |(place, chief): (usize, &mut Chief<B>)| {
+            let master = medium.station(count + place)?.master()?;
+            let cycle = master.cycle_times();
+            let slaves = chief.plan.slaves().filter_map(|address| {
+                let seen = master.slave(address)?;
+                let before = chief.answers.insert(address, seen.answers).unwrap_or(0);
+                let fresh = seen.answers.saturating_sub(before) as f64;
+                let slave = SlaveSnapshot {
+                    state: seen.state,
+                    position: seen.position,
+                    answers_per_second: if window > 0.0 { fresh / window } else { 0.0 },
+                    cycle,
+                    diagnosis: seen.diagnosis,
+                };
+                Some((address, slave))
+            });
+            Some(MasterSnapshot {
+                slaves: slaves.collect(),
+                name: chief.plan.name().to_owned(),
+                address: chief.plan.address(),
+                on_line: master.is_on_line(),
+                cycle,
+            })
+        };
+        self.masters.iter_mut().enumerate().map(snapshot).collect()
+    }
+
     /// Waits until all memories have taken everything.
-    pub(crate) fn finish_memories(&mut self, now: Instant, medium: &mut impl Medium) {
+    pub(crate) fn finish_memories(&mut self, now: Instant, medium: &mut impl Medium<B>) {
         for place in 0..self.devices.len() {
             if medium.station(place).and_then(Member::device).is_some()
                 && let Some(device) = medium.station_mut(place).and_then(Member::device_mut)
@@ -416,51 +343,4 @@ impl Crew {
             }
         }
     }
-}
-
-/// What chance on one place is drawn from: near seeds and near places have nothing in common.
-pub(crate) fn seed_at(seed: u32, place: usize) -> u64 {
-    (u64::from(seed) << 32 | place as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
-}
-
-fn slave_settings(slave: &SlavePlan) -> SlaveSettings {
-    let SlavePlan { mac, exchange, expected_packet_rate, assembly, identity } = *slave;
-    let identity = identity.map(|(vendor, product_code)| DeviceIdentity { vendor, product_code });
-    let mut settings = SlaveSettings { identity, ..SlaveSettings::explicit(mac) };
-    match exchange {
-        Exchange::Poll => settings.poll = Some(PollSettings { expected_packet_rate, assembly }),
-        Exchange::Change { trigger, acknowledged, production_inhibit } => {
-            settings.change = Some(ChangeSettings {
-                trigger,
-                acknowledged,
-                expected_packet_rate,
-                production_inhibit,
-                assembly,
-            });
-        }
-        Exchange::Explicit => {}
-    }
-    settings
-}
-
-fn scanner(plan: &MasterPlan, place: usize) -> Scanner {
-    // No vendor has the code FFFF.
-    let identity = ScannerIdentity { vendor: 0xFFFF, serial: place as u32 + 1 };
-    let mut scanner = Scanner::new(plan.mac, identity, plan.interval);
-    scanner.set_interscan_delay(plan.interscan_delay);
-    for slave in &plan.slaves {
-        // A plan has no address twice, so there are never too many.
-        let _ = scanner.add(slave_settings(slave));
-    }
-    scanner
-}
-
-/// The position in a poll response.
-fn position(input: &[u8]) -> Option<u32> {
-    input.first_chunk().map(|octets| u32::from_le_bytes(*octets))
-}
-
-/// Whether a bus is simulated.
-pub(crate) const fn is_virtual(uri: &BusUri) -> bool {
-    matches!(uri, BusUri::Virtual(_))
 }

@@ -1,29 +1,28 @@
 //! A device in a plant: switched on or off, with its memory, its faults and what it has told.
 
-use codewheel_device::{DeviceNetEncoder, Factory, Product, Snapshot, Switches};
+use codewheel_device::{Event, Snapshot};
 use codewheel_encoder::Start;
-use codewheel_sim::can::{Drops, Troubled};
-use codewheel_sim::shaft::{Faulty, Shaft};
-use codewheel_station::can::{Filter, Frame, Input};
+use codewheel_link::Waker;
+use codewheel_sim::Drops;
 use codewheel_station::{Duration, Instant, Station, earlier};
 use fastrand::Rng;
 
 use crate::fault::{Action, Lever};
+use crate::field_bus::{FieldBus, Outfit, Powered, Switches};
 use crate::keeper::Keeper;
+use crate::repeats::Repeats;
 use crate::report::{Report, Reports, What};
-use crate::{DevicePlan, MemoryError};
-
-type Encoder = DeviceNetEncoder<Faulty<Shaft>>;
+use crate::sensor::PlantSensor;
+use crate::{BusPlan, DevicePlan, MemoryError, StartError};
 
 /// A device with everything that outlives its power.
 #[derive(Debug)]
-pub(crate) struct Device {
-    product: &'static Product,
-    switches: Switches,
-    serial: u32,
-    power: Power,
+pub struct Device<B: FieldBus> {
+    outfit: Outfit<B>,
+    power: Power<B>,
     keeper: Keeper,
     reports: Reports,
+    repeats: Repeats<Event>,
     random: Rng,
     /// Trouble between the device and its bus, over power cuts.
     drops: Option<Drops>,
@@ -31,32 +30,53 @@ pub(crate) struct Device {
 }
 
 #[derive(Debug)]
-enum Power {
-    On(Box<Troubled<Encoder>>),
+enum Power<B: FieldBus> {
+    On(Box<B::Encoder>),
     /// The shaft turns on.
-    Off(Faulty<Shaft>),
+    Off(PlantSensor),
 }
 
-impl Device {
-    /// A device that is still switched off. What chance there is in it is drawn from `seed`.
-    pub(crate) fn new(plan: &DevicePlan, keeper: Keeper, seed: u64) -> Self {
+impl<B: FieldBus> Device<B> {
+    /// A device of `bus` that is still switched off. What chance there is in it is drawn from
+    /// `seed`.
+    ///
+    /// # Errors
+    /// [`StartError`] where its sensor cannot be had.
+    pub(crate) fn new(
+        bus: &BusPlan<B>,
+        plan: &DevicePlan<B>,
+        keeper: Keeper,
+        seed: u64,
+    ) -> Result<Self, StartError> {
         let kept = match keeper.start() {
             Start::Kept { kept, .. } => Some(kept.serial),
             _ => None,
         };
-        let address = u32::from(plan.switches.address());
-        let codes = plan.product.encoder.geometry.range();
-        Self {
+        let address = u32::from(plan.switches.position());
+        let outfit = Outfit {
             product: plan.product,
             switches: plan.switches,
+            options: plan.options,
+            sensor: plan.sensor.clone(),
+            rate: bus.bit_rate,
+            simulated: bus.is_virtual(),
             serial: plan.serial.or(kept).unwrap_or(address),
-            power: Power::Off(Faulty::new(plan.shaft.clone(), codes)),
+        };
+        Ok(Self {
+            power: Power::Off(PlantSensor::new(&plan.sensor, plan.shaft.clone())?),
+            outfit,
             keeper,
             reports: Reports::default(),
+            repeats: Repeats::new(),
             random: Rng::with_seed(seed),
             drops: None,
             delay: Duration::ZERO,
-        }
+        })
+    }
+
+    /// Writes a memory file in a thread of its own from now on.
+    pub(crate) fn write_in_thread(&mut self, waker: &Waker) {
+        self.keeper.write_in_thread(waker);
     }
 
     pub(crate) fn report(&mut self, at: Instant, what: What) {
@@ -69,19 +89,14 @@ impl Device {
 
     /// Switches the device on with what its memory holds.
     pub(crate) fn power_up(&mut self, now: Instant) {
-        let Power::Off(sensor) = &self.power else { return };
-        let encoder = Encoder::power_up(
-            now,
-            self.product,
-            Factory::with_serial(self.serial),
-            self.switches,
-            self.keeper.start(),
-            sensor.clone(),
-        );
-        let mut troubled = Troubled::new(encoder, self.random.u64(..));
-        troubled.set_drops(self.drops);
-        troubled.set_delay(self.delay);
-        self.power = Power::On(Box::new(troubled));
+        let Power::Off(sensor) = &mut self.power else { return };
+        let sensor = sensor.take();
+        let seed = self.random.u64(..);
+        let start = self.keeper.start();
+        let mut encoder = B::Encoder::power_up(now, &self.outfit, start, sensor, seed);
+        encoder.set_drops(self.drops);
+        encoder.set_delay(self.delay);
+        self.power = Power::On(Box::new(encoder));
         self.listen();
     }
 
@@ -91,63 +106,60 @@ impl Device {
         if let Some(Err(error)) = self.keeper.cut(&mut self.random) {
             self.reports.push(now, What::NotKept(error.to_string()));
         }
-        let Power::On(troubled) = &mut self.power else { return };
-        self.drops = troubled.drops();
-        let sensor = troubled.station_mut().sensor_mut().clone();
+        let Power::On(encoder) = &mut self.power else { return };
+        self.drops = encoder.drops();
+        let sensor = encoder.sensor_mut().take();
         self.power = Power::Off(sensor);
     }
 
     /// What it does about a fault that is neither power nor bus.
-    pub(crate) fn suffer(&mut self, action: Action) {
+    pub(crate) fn suffer(&mut self, now: Instant, action: Action) {
         match action {
-            Action::Begin(Lever::Jump(steps)) => self.sensor().jump(steps),
-            Action::Begin(Lever::CellLow(low)) => self.sensor().set_cell_low(low),
-            Action::Begin(Lever::Stuck(stuck)) => self.sensor().set_stuck(stuck),
             Action::Begin(Lever::DropAnswers { probability, count, .. }) => {
                 self.set_drops(Some(Drops { probability, count }));
             }
             Action::End(Lever::DropAnswers { .. }) => self.set_drops(None),
             Action::Begin(Lever::LateAnswers { delay, .. }) => self.set_delay(delay),
             Action::End(Lever::LateAnswers { .. }) => self.set_delay(Duration::ZERO),
+            Action::Begin(lever) if lever.is_of_the_sensor() => match &mut self.power {
+                Power::On(encoder) => {
+                    // A device whose shaft rests has not looked at it for a while, and would find
+                    // nothing wrong with any change since.
+                    encoder.sensor_mut();
+                    encoder.advance(now);
+                    encoder.sensor_mut().suffer(lever);
+                }
+                Power::Off(sensor) => sensor.suffer(lever),
+            },
             Action::Begin(_) | Action::End(_) => {}
         }
     }
 
     fn set_drops(&mut self, drops: Option<Drops>) {
         self.drops = drops;
-        if let Power::On(troubled) = &mut self.power {
-            troubled.set_drops(drops);
+        if let Power::On(encoder) = &mut self.power {
+            encoder.set_drops(drops);
         }
     }
 
     fn set_delay(&mut self, delay: Duration) {
         self.delay = delay;
-        if let Power::On(troubled) = &mut self.power {
-            troubled.set_delay(delay);
+        if let Power::On(encoder) = &mut self.power {
+            encoder.set_delay(delay);
         }
     }
 
-    fn sensor(&mut self) -> &mut Faulty<Shaft> {
-        match &mut self.power {
-            Power::On(troubled) => troubled.station_mut().sensor_mut(),
-            Power::Off(sensor) => sensor,
+    /// The device while it has power.
+    pub(crate) fn powered(&self) -> Option<&B::Encoder> {
+        match &self.power {
+            Power::On(encoder) => Some(encoder),
+            Power::Off(_) => None,
         }
     }
 
     /// What it shows of itself; `None` without power.
     pub(crate) fn snapshot(&self, now: Instant) -> Option<Snapshot> {
-        match &self.power {
-            Power::On(troubled) => Some(troubled.station().snapshot(now)),
-            Power::Off(_) => None,
-        }
-    }
-
-    /// The frames it wants to see.
-    pub(crate) fn filters(&self) -> Vec<Filter> {
-        match &self.power {
-            Power::On(troubled) => vec![troubled.station().filter()],
-            Power::Off(_) => Vec::new(),
-        }
+        self.powered().map(|encoder| encoder.snapshot(now))
     }
 
     /// Waits until the memory has taken everything.
@@ -159,24 +171,29 @@ impl Device {
         }
     }
 
-    /// Hears what the device has to tell, and begins to write what it wants to keep.
+    /// Hears what the device has to tell.
     fn listen(&mut self) {
-        let Power::On(troubled) = &mut self.power else { return };
-        while let Some((at, event)) = troubled.station_mut().take_event() {
-            self.reports.push(at, What::Device(event));
+        let Power::On(encoder) = &mut self.power else { return };
+        while let Some((at, event)) = encoder.take_event() {
+            match self.repeats.tell(at, event) {
+                None => {}
+                Some(1) => self.reports.push(at, What::Device(event)),
+                Some(count) => self.reports.push(at, What::Repeated { event, count }),
+            }
         }
     }
 
+    /// Begins to write what the device wants to keep.
     fn hand_over_record(&mut self, now: Instant) {
-        let Power::On(troubled) = &mut self.power else { return };
-        if let Some(kept) = troubled.station_mut().keep(now) {
+        let Power::On(encoder) = &mut self.power else { return };
+        if let Some(kept) = encoder.keep(now) {
             self.keeper.begin(now, kept);
         }
     }
 
     fn kept(&mut self, now: Instant, result: Result<(), MemoryError>) {
-        let Power::On(troubled) = &mut self.power else { return };
-        troubled.station_mut().kept(now, result.as_ref().copied());
+        let Power::On(encoder) = &mut self.power else { return };
+        encoder.kept(now, result.as_ref().copied());
         if let Err(error) = result {
             self.reports.push(now, What::NotKept(error.to_string()));
         }
@@ -193,35 +210,35 @@ impl Device {
     }
 }
 
-impl Station for Device {
-    type Input<'a> = Input<'a>;
-    type Output = Frame;
+impl<B: FieldBus> Station for Device<B> {
+    type Input<'a> = B::Input<'a>;
+    type Output = B::Output;
 
-    fn handle(&mut self, now: Instant, input: Input<'_>) {
-        if let Power::On(troubled) = &mut self.power {
-            troubled.handle(now, input);
+    fn handle(&mut self, now: Instant, input: B::Input<'_>) {
+        if let Power::On(encoder) = &mut self.power {
+            encoder.handle(now, input);
             self.tend(now);
         }
     }
 
     fn advance(&mut self, now: Instant) {
-        if let Power::On(troubled) = &mut self.power {
-            troubled.advance(now);
+        if let Power::On(encoder) = &mut self.power {
+            encoder.advance(now);
             self.tend(now);
         }
     }
 
-    fn transmit(&mut self, now: Instant) -> Option<Frame> {
-        let Power::On(troubled) = &mut self.power else { return None };
-        let frame = troubled.transmit(now);
+    fn transmit(&mut self, now: Instant) -> Option<B::Output> {
+        let Power::On(encoder) = &mut self.power else { return None };
+        let output = encoder.transmit(now);
         self.hand_over_record(now);
         self.listen();
-        frame
+        output
     }
 
     fn deadline(&self) -> Option<Instant> {
         match &self.power {
-            Power::On(troubled) => earlier(troubled.deadline(), self.keeper.deadline()),
+            Power::On(encoder) => earlier(encoder.deadline(), self.keeper.deadline()),
             Power::Off(_) => None,
         }
     }
@@ -230,16 +247,19 @@ impl Station for Device {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use codewheel_device::MemoryState;
+    use crate::DeviceNet;
+    use codewheel_device::{MemoryState, Product, Switches};
+    use codewheel_link::BusUri;
     use codewheel_sim::can::parse_frame;
-    use codewheel_station::can::BitRate;
+    use codewheel_sim::shaft::Shaft;
+    use codewheel_station::can::{BitRate, Input};
 
     fn micros(micros: u64) -> Instant {
         Instant::ZERO + Duration::from_micros(micros)
     }
 
     /// Runs the device alone up to `until`; whatever it says is sent at once.
-    fn run(device: &mut Device, until: Instant) -> Vec<String> {
+    fn run(device: &mut Device<DeviceNet>, until: Instant) -> Vec<String> {
         let mut said = Vec::new();
         let mut now = Instant::ZERO;
         loop {
@@ -255,7 +275,7 @@ mod tests {
         }
     }
 
-    fn hear(device: &mut Device, now: Instant, text: &str) -> Option<String> {
+    fn hear(device: &mut Device<DeviceNet>, now: Instant, text: &str) -> Option<String> {
         device.handle(now, Input::Frame(&parse_frame(text).unwrap()));
         let frame = device.transmit(now)?;
         device.handle(now, Input::Sent(&frame));
@@ -263,12 +283,13 @@ mod tests {
     }
 
     /// On-line since two seconds, allocated, with a COS delta of 7 in force.
-    fn set_up(seed: u64) -> Device {
+    fn set_up(seed: u64) -> Device<DeviceNet> {
         let product = Product::find("amg11-d29").unwrap();
         let shaft = Shaft::parse("still", 8192, 65536).unwrap();
+        let bus = BusPlan::new("b", BusUri::Virtual("b".into()), BitRate::Kbit125);
         let plan = DevicePlan::new(product, Switches::set_to(5, BitRate::Kbit125), shaft);
         let (keeper, _) = Keeper::open(None, product).unwrap();
-        let mut device = Device::new(&plan, keeper, seed);
+        let mut device = Device::new(&bus, &plan, keeper, seed).unwrap();
         device.power_up(Instant::ZERO);
         assert_eq!(run(&mut device, micros(2_100_000)).len(), 2, "two checks");
         let at = micros(2_100_000);

@@ -3,9 +3,12 @@
 use std::collections::VecDeque;
 use std::fmt;
 
+use codewheel_device::Product;
+use codewheel_sim::ssi;
 use codewheel_station::{Duration, Instant};
 
-use crate::TimeSpan;
+use crate::check::fault_of_words;
+use crate::{SensorPlan, TimeSpan};
 
 /// Something that goes wrong with a device, or right again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +17,17 @@ pub struct Fault {
     pub at: Instant,
     /// What happens.
     pub lever: Lever,
+}
+
+impl Fault {
+    /// The fault that `words` name for `product` with `sensor` on a real port, with the words of
+    /// plant files: `jump steps=4000 at=5s`, `power-cut at=2s for=500ms`.
+    ///
+    /// # Errors
+    /// What is wrong with them, as one sentence.
+    pub fn parse(words: &str, product: &Product, sensor: &SensorPlan) -> Result<Self, String> {
+        fault_of_words(words, product, sensor)
+    }
 }
 
 /// The levers of faults.
@@ -27,7 +41,7 @@ pub enum Lever {
     Stuck(bool),
     /// The power is gone for so long; a record in RAM that is just being written is torn.
     PowerCut(Duration),
-    /// Frames of the device are dropped.
+    /// Frames or telegrams of the device are dropped.
     DropAnswers {
         /// How likely each one is dropped, 0 … 1.
         probability: f64,
@@ -36,16 +50,18 @@ pub enum Lever {
         /// For how long; `None`: for ever.
         lasts: Option<Duration>,
     },
-    /// Frames of the device come late.
+    /// Frames or telegrams of the device come late.
     LateAnswers {
         /// How late.
         delay: Duration,
         /// For how long; `None`: for ever.
         lasts: Option<Duration>,
     },
-    /// The controller leaves the bus for 128 times 11 recessive bits.
+    /// The CAN controller leaves the bus for 128 times 11 recessive bits.
     BusOff,
-    /// Frames of the device are destroyed on the wire, which counts up to bus-off.
+    /// Something is wrong with the encoder at an SSI line or its wires, or right again.
+    Ssi(Option<ssi::Fault>),
+    /// What the device sends is destroyed on the wire; a CAN controller counts that up to bus-off.
     BadTransceiver {
         /// How likely each one is destroyed, 0 … 1.
         probability: f64,
@@ -65,6 +81,11 @@ impl Lever {
             | Self::BadTransceiver { lasts, .. } => *lasts,
             _ => None,
         }
+    }
+
+    /// Whether it acts on the sensor.
+    pub(crate) const fn is_of_the_sensor(&self) -> bool {
+        matches!(self, Self::Jump(_) | Self::CellLow(_) | Self::Stuck(_) | Self::Ssi(_))
     }
 }
 
@@ -90,6 +111,20 @@ impl fmt::Display for Lever {
                 write!(f, "answers are {} late", TimeSpan(*delay))?;
             }
             Self::BusOff => f.write_str("the controller leaves the bus")?,
+            Self::Ssi(None) => f.write_str("the SSI line is right again")?,
+            Self::Ssi(Some(ssi::Fault::Unplugged)) => {
+                f.write_str("the SSI encoder is unplugged")?
+            }
+            Self::Ssi(Some(ssi::Fault::Shorted)) => f.write_str("the SSI data line is shorted")?,
+            Self::Ssi(Some(ssi::Fault::WordLength(bits))) => {
+                write!(f, "the SSI encoder sends words of {bits} bits")?;
+            }
+            Self::Ssi(Some(ssi::Fault::NoMonoflop)) => {
+                f.write_str("the SSI encoder loses its monoflop")?;
+            }
+            Self::Ssi(Some(ssi::Fault::FlippedBits(bits))) => {
+                write!(f, "bits {bits:X}h of each SSI word arrive inverted")?;
+            }
             Self::BadTransceiver { probability, .. } => {
                 f.write_str("the transceiver destroys what it sends")?;
                 if *probability < 1.0 {

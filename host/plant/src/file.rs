@@ -2,18 +2,26 @@
 //!
 //! What the values mean together is told by [`check`](crate::check).
 
+mod master;
+
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::PathBuf;
 
-use codewheel_device::product;
+use codewheel_device::Product;
 use codewheel_station::can::BitRate;
+use codewheel_station::rs485::BaudRate;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, MapAccess, Visitor, value::MapAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use toml::Spanned;
 
 use crate::TimeSpan;
+
+pub(crate) use master::{
+    ConfigurationName, Connection, DirectionName, MasterKind, MasterTable, PresetTable, SlaveTable,
+};
 
 /// A plant: buses, the devices on them, their shafts, memories and faults, and the masters that
 /// talk to them.
@@ -42,22 +50,45 @@ pub(crate) struct BusTable {
     /// What is spoken on it.
     #[serde(default)]
     pub(crate) kind: BusKind,
-    /// Where it is: virtual:NAME is simulated, slcan-listen:HOST:PORT plays an adapter that others
-    /// connect to, slcan:HOST:PORT connects to an adapter. Default virtual: and the name.
+    /// Where it is: virtual:NAME is simulated. A DeviceNet: slcan-listen:HOST:PORT plays an adapter
+    /// that others connect to, slcan:HOST:PORT connects to an adapter. A PROFIBUS:
+    /// rs485-listen:HOST:PORT and rs485-listen:pty:PATH are a line that others connect to,
+    /// rs485:HOST:PORT connects to such a line, rs485:/dev/tty… is a serial port. Default virtual:
+    /// and the name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<String>")]
     pub(crate) uri: Option<Spanned<String>>,
-    /// The bit rate.
-    #[serde(default)]
-    pub(crate) baud: Baud,
-    /// How likely a station misses a frame, 0 to 1. Virtual buses only.
+    /// The bit rate. A DeviceNet has 125k, 250k and 500k, default 125k; a PROFIBUS 9.6k, 19.2k,
+    /// 45.45k, 93.75k, 187.5k, 500k, 1.5M, 3M, 6M and 12M, default 1.5M.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>", transform = rates)]
+    pub(crate) baud: Option<Spanned<String>>,
+    /// PROFIBUS: how long its cable is, in metres; no longer than the rate allows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<u32>")]
+    pub(crate) cable_m: Option<Spanned<u32>>,
+    /// How likely a station misses a frame or telegram, 0 to 1. Virtual buses only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0))]
     pub(crate) loss: Option<Spanned<f64>>,
-    /// How likely a frame is destroyed and repeated, 0 to 1. Virtual buses only.
+    /// How likely a frame or telegram is destroyed, 0 to 1; a frame is repeated. Virtual buses
+    /// only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0))]
     pub(crate) corruption: Option<Spanned<f64>>,
+    /// PROFIBUS: how likely a character is broken, 0 to 1. Virtual buses only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0))]
+    pub(crate) broken: Option<Spanned<f64>>,
+    /// PROFIBUS: how likely two bits of a character are turned over, which its parity does not
+    /// show, 0 to 1. Virtual buses only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0))]
+    pub(crate) flipped: Option<Spanned<f64>>,
+    /// PROFIBUS: how likely a telegram has a pause in it, 0 to 1. Virtual buses only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0))]
+    pub(crate) pause: Option<Spanned<f64>>,
     /// What all chance on this bus is drawn from: the same seed, the same course of events.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<u32>")]
@@ -70,42 +101,21 @@ pub(crate) enum BusKind {
     #[default]
     #[serde(rename = "devicenet")]
     DeviceNet,
+    #[serde(rename = "profibus")]
+    Profibus,
 }
 
-/// A bit rate of DeviceNet.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub(crate) enum Baud {
-    #[default]
-    #[serde(rename = "125k")]
-    Kbit125,
-    #[serde(rename = "250k")]
-    Kbit250,
-    #[serde(rename = "500k")]
-    Kbit500,
-}
-
-impl From<Baud> for BitRate {
-    fn from(baud: Baud) -> Self {
-        match baud {
-            Baud::Kbit125 => Self::Kbit125,
-            Baud::Kbit250 => Self::Kbit250,
-            Baud::Kbit500 => Self::Kbit500,
-        }
-    }
-}
-
-impl From<BitRate> for Baud {
-    fn from(rate: BitRate) -> Self {
-        match rate {
-            BitRate::Kbit125 => Self::Kbit125,
-            BitRate::Kbit250 => Self::Kbit250,
-            BitRate::Kbit500 => Self::Kbit500,
-        }
-    }
+/// Names the rates of both buses, each once.
+fn rates(schema: &mut Schema) {
+    let of_can = BitRate::ALL.iter().map(ToString::to_string);
+    let mut rates: Vec<_> = of_can.chain(BaudRate::ALL.iter().map(ToString::to_string)).collect();
+    let mut seen = BTreeSet::new();
+    rates.retain(|rate| seen.insert(rate.clone()));
+    schema.insert("enum".into(), rates.into());
 }
 
 fn models(schema: &mut Schema) {
-    let models: Vec<_> = product::DEVICENET.iter().map(|product| product.model).collect();
+    let models: Vec<_> = Product::all().map(|product| product.model).collect();
     schema.insert("enum".into(), models.into());
 }
 
@@ -123,9 +133,10 @@ pub(crate) struct DeviceTable {
     /// The model, as `codewheel models` lists it.
     #[schemars(with = "String", transform = models)]
     pub(crate) model: Spanned<String>,
-    /// The address, 0 to 63; sets the switches, those of the bit rate as the bus has it.
+    /// The address, 0 to 63 on a DeviceNet, 0 to 99 on a PROFIBUS; sets the switches, on a
+    /// DeviceNet those of the bit rate as the bus has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<u8>", range(max = 63))]
+    #[schemars(with = "Option<u8>", range(max = 99))]
     pub(crate) address: Option<Spanned<i64>>,
     /// The switches themselves, where `address` cannot say it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -135,10 +146,20 @@ pub(crate) struct DeviceTable {
     #[serde(default)]
     pub(crate) termination: bool,
     /// What its shaft does: still, turn rpm=60, sine amplitude=90deg period=2s,
-    /// profile 0s:0 1s:90deg, csv FILE.
+    /// profile 0s:0 1s:90deg, csv FILE. Of a converter: the shaft of the encoder at its SSI line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<String>")]
     pub(crate) shaft: Option<Spanned<String>>,
+    /// PROFIBUS: whether it searches the rate of its line. Default true on virtual buses, false on
+    /// others, where it is told the rate of the bus.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<bool>")]
+    pub(crate) auto_baud: Option<Spanned<bool>>,
+    /// Of a converter (HEAG 162): how it reads the encoder at its SSI line, and what that encoder
+    /// sends. Default: the word of the product, Gray, 500k, 20us, read once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<SsiTable>")]
+    pub(crate) ssi: Option<Spanned<SsiTable>>,
     /// The file of its non-volatile memory, from the folder of the plant file. Without one it
     /// forgets with the process, but not with a power cut.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -170,8 +191,8 @@ pub(crate) struct SwitchTable {
     /// Rotary switch 1, tens, and 2, units: 0 to 9 each.
     #[schemars(inner(range(max = 9)))]
     pub(crate) rotary: [u8; 2],
-    /// DIP switches 1, 2 and 3, true for ON; 1 means nothing, 2 and 3 set the bit rate. Default:
-    /// as the bus has it.
+    /// DeviceNet: DIP switches 1, 2 and 3, true for ON; 1 means nothing, 2 and 3 set the bit rate.
+    /// Default: as the bus has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) dip: Option<[bool; 3]>,
 }
@@ -228,6 +249,45 @@ impl JsonSchema for SwitchesValue {
     }
 }
 
+/// How a converter reads its SSI line.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SsiTable {
+    /// The bits of the word: 13, 18 or 29 as the product says, or 25 on an SP 29.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<u8>")]
+    pub(crate) word: Option<Spanned<u8>>,
+    /// How the code is written. Default gray.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) code: Option<CodeName>,
+    /// The clock, 100k to 1M. Default 500k.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub(crate) clock: Option<Spanned<String>>,
+    /// How long the encoder wants no clock before it latches anew. Default 20us.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<TimeSpan>")]
+    pub(crate) monoflop: Option<Spanned<TimeSpan>>,
+    /// A real encoder in place of the one on the shaft, at an SPI controller of Linux:
+    /// spidev:/dev/spidev0.0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub(crate) line: Option<Spanned<String>>,
+    /// Whether each word is read twice and compared. Default false.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) double_read: Option<bool>,
+}
+
+/// How a code is written in an SSI word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum CodeName {
+    /// One bit changes with each step.
+    Gray,
+    /// The binary number.
+    Binary,
+}
+
 /// Something that goes wrong, or right again, at one moment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -250,7 +310,7 @@ pub(crate) struct FaultTable {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<u32>")]
     pub(crate) count: Option<Spanned<u32>>,
-    /// For drop-answers and bad-transceiver: how likely each frame is hit, 0 to 1. Default 1.
+    /// For drop-answers and bad-transceiver: how likely each answer is hit, 0 to 1. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0))]
     pub(crate) probability: Option<Spanned<f64>>,
@@ -258,6 +318,10 @@ pub(crate) struct FaultTable {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<TimeSpan>")]
     pub(crate) delay: Option<Spanned<TimeSpan>>,
+    /// For ssi-wrong-word: how many bits, 1 to 32. For ssi-flipped-bits: which ones, as a number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<u32>")]
+    pub(crate) bits: Option<Spanned<u32>>,
 }
 
 /// What can go wrong with a device.
@@ -283,106 +347,21 @@ pub(crate) enum FaultKind {
     LateAnswers,
     /// The CAN controller leaves the bus for 128 times 11 bits.
     BusOff,
-    /// What the device sends is destroyed on the wire, until its controller leaves the bus. Virtual
-    /// buses only.
+    /// What the device sends is destroyed on the wire; a CAN controller leaves the bus in the end.
+    /// Virtual buses only.
     BadTransceiver,
-}
-
-/// A master.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct MasterTable {
-    /// What messages call it. Default: scanner and its address.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) name: Option<String>,
-    /// What it is.
-    #[serde(default)]
-    pub(crate) kind: MasterKind,
-    /// The bus it is on. Default: the bus, where there is only one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<String>")]
-    pub(crate) bus: Option<Spanned<String>>,
-    /// Its address, 0 to 63.
-    #[schemars(with = "u8", range(max = 63))]
-    pub(crate) address: Spanned<i64>,
-    /// How often it polls. Default 10ms; 0s: as fast as the bus carries it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) interval: Option<TimeSpan>,
-    /// The shortest pause between two poll cycles. Default 0s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) interscan_delay: Option<TimeSpan>,
-    /// Whether its terminating resistor is on. Default true.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) termination: Option<bool>,
-    /// It has the address of an earlier station on purpose.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<bool>")]
-    pub(crate) duplicate: Option<Spanned<bool>>,
-    /// Its scan list. Default: every device of its bus.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) slave: Option<Vec<SlaveTable>>,
-}
-
-/// What a master is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum MasterKind {
-    #[default]
-    Scanner,
-}
-
-/// One line of a scan list.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct SlaveTable {
-    /// Its address, 0 to 63.
-    #[schemars(with = "u8", range(max = 63))]
-    pub(crate) address: Spanned<i64>,
-    /// How its data is fetched.
-    #[serde(default)]
-    pub(crate) connection: Connection,
-    /// The expected packet rate, 0 to 65535ms in whole milliseconds; after four times as long the
-    /// connection times out, and change-of-state and cyclic slaves produce at least this often.
-    /// Default 200ms, 1s for change-of-state; 0s: never. A cyclic slave needs at least 1ms.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<TimeSpan>")]
-    pub(crate) expected_packet_rate: Option<Spanned<TimeSpan>>,
-    /// For change-of-state and cyclic: whether each production is acknowledged. Default true.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<bool>")]
-    pub(crate) acknowledged: Option<Spanned<bool>>,
-    /// For change-of-state and cyclic: the shortest pause between two productions, at most the
-    /// expected packet rate. Default 0s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<TimeSpan>")]
-    pub(crate) production_inhibit: Option<Spanned<TimeSpan>>,
-    /// What it shall produce; of these encoders assembly 1, the position, or 2, position and flags.
-    /// Default: what it has kept.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) assembly: Option<u8>,
-    /// The vendor it must have; together with product_code.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<u16>")]
-    pub(crate) vendor: Option<Spanned<u16>>,
-    /// The product code it must have; together with vendor.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<u16>")]
-    pub(crate) product_code: Option<Spanned<u16>>,
-}
-
-/// How the data of a slave is fetched.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum Connection {
-    /// The master asks and the slave answers.
-    #[default]
-    Poll,
-    /// The slave produces what changes, and at the expected packet rate.
-    ChangeOfState,
-    /// The slave produces at the expected packet rate.
-    Cyclic,
-    /// The slave is only kept reachable; no I/O data.
-    Explicit,
+    /// The SSI encoder is unplugged: its line stays high.
+    SsiUnplugged,
+    /// The SSI data line is shorted: it stays low.
+    SsiShort,
+    /// The SSI encoder sends words of another length.
+    SsiWrongWord,
+    /// The SSI encoder does not pull its line low after the word.
+    SsiNoMonoflop,
+    /// Some bits of each SSI word arrive inverted; its repetition is sound.
+    SsiFlippedBits,
+    /// Nothing is wrong with the SSI line any more.
+    SsiRight,
 }
 
 /// The JSON Schema of plant files, as text that ends with a line feed.

@@ -62,12 +62,12 @@ impl Keeper {
     }
 
     /// Writes a file in a thread of its own from now on, which uses `waker` after each record.
-    pub(crate) fn in_thread(self, waker: Waker) -> Self {
-        let store = match self.store {
-            Store::File(file) => Store::Thread(Writer::begin(file, waker)),
+    pub(crate) fn write_in_thread(&mut self, waker: &Waker) {
+        let store = std::mem::replace(&mut self.store, Store::Ram(TornMemory::new()));
+        self.store = match store {
+            Store::File(file) => Store::Thread(Writer::begin(file, waker.clone())),
             store => store,
         };
-        Self { store, ..self }
     }
 
     pub(crate) const fn start(&self) -> &Start {

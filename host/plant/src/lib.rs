@@ -7,29 +7,42 @@
 
 mod check;
 mod complaint;
-mod composite;
 mod crew;
 mod device;
+mod devicenet;
 mod fault;
+mod field_bus;
 mod file;
 mod keeper;
+mod manned;
 mod memory;
 mod plant;
 mod port_bus;
 mod print;
+mod profibus;
+mod repeats;
 mod report;
 mod running;
+mod seats;
+mod sensor;
+mod snapshot;
 mod time_span;
 mod virtual_bus;
 
 pub use complaint::{Complaint, PlantError};
-pub use crew::{BusSnapshot, DeviceSnapshot, MasterSnapshot, SlaveSnapshot};
+pub use devicenet::{DeviceNet, Exchange, MasterPlan, SlavePlan};
 pub use fault::{Fault, Lever};
+pub use field_bus::FieldBus;
 pub use file::schema;
 pub use memory::{Found, MemoryError, MemoryFile};
-pub use plant::{BusPlan, DevicePlan, Exchange, MasterPlan, Plant, SlavePlan};
+pub use plant::{AnyBusPlan, BusPlan, DevicePlan, Plant};
 pub use port_bus::{PortBus, StartError};
+pub use profibus::{Cable, DeviceOptions, DpMasterPlan, DpSlavePlan, PresetPlan, Profibus};
 pub use report::{Report, What};
 pub use running::Running;
+pub use sensor::SensorPlan;
+pub use snapshot::{
+    BusSnapshot, CycleTimes, DeviceSnapshot, Diagnosis, MasterSnapshot, SlaveSnapshot, SlaveState,
+};
 pub use time_span::{NoTimeSpan, TimeSpan};
 pub use virtual_bus::VirtualBus;

@@ -84,9 +84,7 @@ impl MemoryFile {
         if let Start::Kept { kept, .. } = &start
             && kept.fingerprint != product.fingerprint
         {
-            let owner = codewheel_device::product::DEVICENET
-                .iter()
-                .find(|other| other.fingerprint == kept.fingerprint);
+            let owner = Product::all().find(|other| other.fingerprint == kept.fingerprint);
             return Err(MemoryError::AnotherProduct {
                 path: path.to_owned(),
                 owner: owner.map_or("a model this version does not know".into(), |owner| {

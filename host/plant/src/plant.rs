@@ -3,59 +3,81 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use codewheel_device::{Product, Switches};
-use codewheel_devicenet::MacId;
-use codewheel_devicenet::scanner::Trigger;
+use codewheel_device::{Product, product};
 use codewheel_link::BusUri;
-use codewheel_sim::can::Faults;
 use codewheel_sim::shaft::Shaft;
-use codewheel_station::Duration;
-use codewheel_station::can::BitRate;
 
 use crate::check::check;
 use crate::fault::Fault;
+use crate::field_bus::{FieldBus, Switches};
 use crate::print::print;
-use crate::{Complaint, PlantError};
+use crate::{Complaint, DeviceNet, PlantError, Profibus, SensorPlan};
 
 /// Buses with their devices and masters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plant {
     /// The buses, in the order of the file.
-    pub buses: Vec<BusPlan>,
+    pub buses: Vec<AnyBusPlan>,
 }
+
+/// One bus, whichever it is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AnyBusPlan {
+    /// A DeviceNet.
+    DeviceNet(BusPlan<DeviceNet>),
+    /// A PROFIBUS.
+    Profibus(BusPlan<Profibus>),
+}
+
+/// Does the same with a bus, whichever it is.
+macro_rules! any_bus {
+    ($any:expr, $bus:ident => $what:expr) => {
+        match $any {
+            $crate::AnyBusPlan::DeviceNet($bus) => $what,
+            $crate::AnyBusPlan::Profibus($bus) => $what,
+        }
+    };
+}
+pub(crate) use any_bus;
 
 /// One bus.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BusPlan {
+pub struct BusPlan<B: FieldBus = DeviceNet> {
     /// Its name.
     pub name: String,
     /// Where it is; `virtual:` is simulated.
     pub uri: BusUri,
     /// Its bit rate.
-    pub bit_rate: BitRate,
+    pub bit_rate: B::Rate,
+    /// Its cable.
+    pub cable: B::Cable,
     /// How often a virtual wire fails.
-    pub faults: Faults,
+    pub faults: B::Faults,
     /// What all chance on it is drawn from.
     pub seed: u32,
     /// Its devices.
-    pub devices: Vec<DevicePlan>,
+    pub devices: Vec<DevicePlan<B>>,
     /// Its masters.
-    pub masters: Vec<MasterPlan>,
+    pub masters: Vec<B::MasterPlan>,
 }
 
 /// One device.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DevicePlan {
+pub struct DevicePlan<B: FieldBus = DeviceNet> {
     /// What messages call it.
     pub name: String,
     /// The product.
     pub product: &'static Product,
     /// Its switches.
-    pub switches: Switches,
+    pub switches: B::Switches,
+    /// What else it is told at power-up.
+    pub options: B::Options,
     /// Its shaft, which begins with the plant.
     pub shaft: Shaft,
     /// The shaft as text.
     pub shaft_text: String,
+    /// How it comes from the shaft to its code.
+    pub sensor: SensorPlan,
     /// The file that holds its non-volatile memory; without one it forgets with the process.
     pub memory: Option<PathBuf>,
     /// Its serial number; by default what the memory holds, else the address.
@@ -66,64 +88,61 @@ pub struct DevicePlan {
     pub faults: Vec<Fault>,
 }
 
-/// One master.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MasterPlan {
-    /// What messages call it.
-    pub name: String,
-    /// Its address.
-    pub mac: MacId,
-    /// How often it polls.
-    pub interval: Duration,
-    /// The shortest pause between two poll cycles.
-    pub interscan_delay: Duration,
-    /// Whether its terminating resistor is on.
-    pub termination: bool,
-    /// It has the address of an earlier station on purpose.
-    pub duplicate: bool,
-    /// Its scan list.
-    pub slaves: Vec<SlavePlan>,
-}
-
-/// How the data of a slave is fetched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Exchange {
-    /// The master asks and the slave answers.
-    Poll,
-    /// The slave produces of its own accord.
-    Change {
-        /// What makes it produce.
-        trigger: Trigger,
-        /// Whether each production is acknowledged.
-        acknowledged: bool,
-        /// The shortest pause between two productions in ms; 0: none.
-        production_inhibit: u16,
-    },
-    /// The slave is only kept reachable.
-    Explicit,
-}
-
-/// One line of a scan list.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SlavePlan {
-    /// Its address.
-    pub mac: MacId,
-    /// How its data is fetched.
-    pub exchange: Exchange,
-    /// The expected packet rate in ms; 0: no time-out.
-    pub expected_packet_rate: u16,
-    /// The assembly it shall produce; `None` leaves what it has kept.
-    pub assembly: Option<u8>,
-    /// Vendor and product code it must have; `None` takes any.
-    pub identity: Option<(u16, u16)>,
-}
-
-impl SlavePlan {
-    /// Polls `mac`, whatever it is, with an expected packet rate of 200 ms.
+impl AnyBusPlan {
+    /// What is spoken on it.
     #[must_use]
-    pub const fn poll(mac: MacId) -> Self {
-        let exchange = Exchange::Poll;
-        Self { mac, exchange, expected_packet_rate: 200, assembly: None, identity: None }
+    pub const fn bus(&self) -> product::Bus {
+        match self {
+            Self::DeviceNet(_) => product::Bus::DeviceNet,
+            Self::Profibus(_) => product::Bus::Profibus,
+        }
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        any_bus!(self, bus => &bus.name)
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub const fn uri(&self) -> &BusUri {
+        any_bus!(self, bus => &bus.uri)
+    }
+
+    /// How many devices it has.
+    #[must_use]
+    pub const fn devices(&self) -> usize {
+        any_bus!(self, bus => bus.devices.len())
+    }
+
+    /// How many masters it has.
+    #[must_use]
+    pub const fn masters(&self) -> usize {
+        any_bus!(self, bus => bus.masters.len())
+    }
+}
+
+impl<B: FieldBus> BusPlan<B> {
+    /// A bus on which nobody is yet and nothing goes wrong.
+    #[must_use]
+    pub fn new(name: impl Into<String>, uri: BusUri, bit_rate: B::Rate) -> Self {
+        Self {
+            name: name.into(),
+            uri,
+            bit_rate,
+            cable: B::Cable::default(),
+            faults: B::Faults::default(),
+            seed: 0,
+            devices: Vec::new(),
+            masters: Vec::new(),
+        }
+    }
+
+    /// Whether it is simulated.
+    #[must_use]
+    pub const fn is_virtual(&self) -> bool {
+        matches!(self.uri, BusUri::Virtual(_))
     }
 }
 
@@ -156,16 +175,18 @@ impl Plant {
     }
 }
 
-impl DevicePlan {
-    /// A device without memory file and faults, named by its model and address.
+impl<B: FieldBus> DevicePlan<B> {
+    /// A device on a shaft at rest, without memory file and faults, named by its model and address.
     #[must_use]
-    pub fn new(product: &'static Product, switches: Switches, shaft: Shaft) -> Self {
+    pub fn new(product: &'static Product, switches: B::Switches, shaft: Shaft) -> Self {
         Self {
-            name: default_name(product.model, switches.address()),
+            name: default_name(product.model, switches.position()),
             product,
             switches,
+            options: B::Options::default(),
             shaft,
             shaft_text: "still".into(),
+            sensor: SensorPlan::default(),
             memory: None,
             serial: None,
             duplicate: false,

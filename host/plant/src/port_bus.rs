@@ -1,14 +1,19 @@
 //! A bus on a real port: all its devices and masters share the port.
 
-use codewheel_link::{BusUri, CanPort, Clock, LinkError, Loop, Waker};
-use codewheel_station::can::BitRate;
-use codewheel_station::{Duration, Instant, earlier};
+use codewheel_commission::profibus::SettingsError;
+use codewheel_encoder::ssi::Refusal;
+use codewheel_link::{Clock, LinkError, Waker};
+#[cfg(target_os = "linux")]
+use codewheel_spidev::CannotOpen;
+use codewheel_spidev::SsiUri;
+use codewheel_station::{Instant, earlier};
 use thiserror::Error;
 
-use crate::composite::Composite;
-use crate::crew::{BusSnapshot, Crew, Manned, Medium, Member};
+use crate::crew::Crew;
+use crate::field_bus::{FieldBus, Shared};
+use crate::manned::Manned;
 use crate::report::{Report, What};
-use crate::{BusPlan, MemoryError};
+use crate::{BusPlan, BusSnapshot, DeviceNet, MemoryError};
 
 /// Why a plant cannot be started.
 #[derive(Debug, Error)]
@@ -19,47 +24,50 @@ pub enum StartError {
     /// A bus.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// A DP master cannot be what its plan says.
+    #[error(transparent)]
+    Master(#[from] SettingsError),
+    /// An SSI line cannot be read as its plan says.
+    #[error(transparent)]
+    Ssi(#[from] Refusal),
+    /// An SPI controller cannot be an SSI line.
+    #[cfg(target_os = "linux")]
+    #[error(transparent)]
+    Spidev(#[from] CannotOpen),
+    /// This system has no such SSI lines.
+    #[error("{0} cannot be opened here: SPI controllers are files on Linux only")]
+    SsiNotHere(SsiUri),
 }
-
-/// How many bits a controller stays off the bus, at least: 128 times 11.
-const BUS_OFF_BITS: u64 = 128 * 11;
 
 /// A bus on a real port, in the time of the clock it was given.
 #[derive(Debug)]
-pub struct PortBus {
-    stations: Stations,
-    port: Box<dyn CanPort>,
-    drive: Loop,
-    crew: Crew,
+pub struct PortBus<B: FieldBus = DeviceNet> {
+    stations: B::Stations,
+    port: B::Port,
+    drive: B::Loop,
+    clock: Clock,
+    crew: Crew<B>,
     uri: String,
 }
 
-#[derive(Debug)]
-struct Stations {
-    composite: Composite<Member>,
-    bus_off_time: Duration,
-}
-
-impl PortBus {
+impl<B: FieldBus> PortBus<B> {
     /// Opens the memory files and the port, and switches everything on.
     ///
     /// # Errors
     /// [`StartError`]; nothing is left half started.
-    pub fn power_up(plan: BusPlan, clock: Clock) -> Result<Self, StartError> {
+    pub fn power_up(plan: BusPlan<B>, clock: Clock) -> Result<Self, StartError> {
         let manned = Manned::open(plan)?;
-        let port = open(&manned.plan.uri, manned.plan.bit_rate)?;
+        let port = B::open(&manned.plan.uri, manned.plan.bit_rate)?;
         Ok(Self::begin(manned, port, clock))
     }
 
-    pub(crate) fn begin(manned: Manned, port: Box<dyn CanPort>, clock: Clock) -> Self {
-        let bit_nanos = manned.plan.bit_rate.bit_nanos();
-        let bus_off_time = Duration::from_nanos(BUS_OFF_BITS * bit_nanos);
-        let mut stations = Stations { composite: Composite::new(), bus_off_time };
-        let mut crew = Crew::power_up(manned.in_threads(&port.waker()), &mut stations);
+    pub(crate) fn begin(manned: Manned<B>, port: B::Port, clock: Clock) -> Self {
+        let mut stations = B::Stations::new(manned.plan.bit_rate);
+        let mut crew = Crew::power_up(manned.in_threads(&B::waker(&port)), &mut stations);
         // What has no power at the beginning says nothing.
         crew.pull_levers(Instant::ZERO, &mut stations);
-        let uri = port.describe();
-        Self { stations, port, drive: Loop::new(clock), crew, uri }
+        let uri = B::describe(&port);
+        Self { stations, port, drive: B::drive(clock), clock, crew, uri }
     }
 
     /// Where the bus is, with the port it really got.
@@ -71,7 +79,7 @@ impl PortBus {
     /// Ends a wait of [`turn`](Self::turn).
     #[must_use]
     pub fn waker(&self) -> Waker {
-        self.port.waker()
+        B::waker(&self.port)
     }
 
     /// One turn of the stations and the port: waits once, for input, a wake-up, a deadline, a fault
@@ -82,9 +90,9 @@ impl PortBus {
     pub fn turn(&mut self, until: Option<Instant>) -> Result<(), LinkError> {
         self.crew.pull_levers(self.now(), &mut self.stations);
         let until = earlier(until, self.crew.next_fault());
-        let outcome = self.drive.turn(&mut self.stations.composite, &mut *self.port, until)?;
+        let notices = self.stations.turn(&mut self.drive, &mut self.port, until)?;
         let now = self.now();
-        for notice in outcome.notices {
+        for notice in notices {
             self.crew.report(now, What::Port(notice));
         }
         Ok(())
@@ -106,36 +114,6 @@ impl PortBus {
     }
 
     fn now(&self) -> Instant {
-        self.drive.clock().now()
-    }
-}
-
-pub(crate) fn open(uri: &BusUri, rate: BitRate) -> Result<Box<dyn CanPort>, LinkError> {
-    codewheel_link::open(uri, rate)
-}
-
-impl Medium for Stations {
-    fn plug_in(&mut self, place: usize, station: Member) {
-        self.composite.put(place, station);
-    }
-
-    fn unplug(&mut self, place: usize) -> Option<Member> {
-        self.composite.take(place)
-    }
-
-    fn station(&self, place: usize) -> Option<&Member> {
-        self.composite.station(place)
-    }
-
-    fn station_mut(&mut self, place: usize) -> Option<&mut Member> {
-        self.composite.station_mut(place)
-    }
-
-    fn bus_off(&mut self, place: usize, now: Instant) {
-        self.composite.bus_off(place, now, now + self.bus_off_time);
-    }
-
-    fn set_corruption(&mut self, _: usize, _: Option<f64>) {
-        // A plan has this for virtual buses only.
+        self.clock.now()
     }
 }

@@ -1,28 +1,58 @@
 //! From a plant to the text of a plant file, every default filled in.
 
-use codewheel_device::Switches;
-use codewheel_devicenet::scanner::Trigger;
-use codewheel_station::can::BitRate;
+mod devicenet;
+mod profibus;
+
+use codewheel_encoder::ssi::{Code, Settings};
+use codewheel_sim::ssi;
+use codewheel_spidev::SsiUri;
 use codewheel_station::{Duration, Instant};
 use toml::Spanned;
 
 use crate::fault::{Fault, Lever};
+use crate::field_bus::FieldBus;
 use crate::file::{
-    BusKind, BusTable, Connection, DeviceTable, FaultKind, FaultTable, MasterKind, MasterTable,
-    PlantFile, SlaveTable, SwitchTable, SwitchesValue,
+    BusKind, BusTable, CodeName, DeviceTable, FaultKind, FaultTable, MasterTable, PlantFile,
+    SsiTable, SwitchesValue,
 };
-use crate::{BusPlan, DevicePlan, Exchange, MasterPlan, Plant, SlavePlan, TimeSpan};
+use crate::plant::any_bus;
+use crate::{BusPlan, DevicePlan, Plant, SensorPlan, TimeSpan};
+
+/// What the plans of one field bus are in tables.
+trait Printed: FieldBus {
+    /// What plant files call it.
+    const KIND: BusKind;
+
+    /// Adds what only this bus has.
+    fn bus(bus: &BusPlan<Self>, table: &mut BusTable);
+
+    /// The address where it says everything, else the switches.
+    fn switches(
+        device: &DevicePlan<Self>,
+        bus: &BusPlan<Self>,
+    ) -> (Option<u8>, Option<SwitchesValue>);
+
+    /// Whether a device searches its rate, where that can be said.
+    fn auto_baud(device: &DevicePlan<Self>) -> Option<bool>;
+
+    /// A master.
+    fn master_table(master: &Self::MasterPlan, bus: &BusPlan<Self>) -> MasterTable;
+}
 
 /// The text of a plant file.
 pub(crate) fn print(plant: &Plant) -> String {
     let mut file = PlantFile::default();
     for bus in &plant.buses {
-        file.bus.push(bus_table(bus));
-        file.device.extend(bus.devices.iter().map(|device| device_table(device, bus)));
-        file.master.extend(bus.masters.iter().map(|master| master_table(master, bus)));
+        any_bus!(bus, bus => add(bus, &mut file));
     }
     // Nothing in a plant file is a thing TOML cannot write.
     toml::to_string_pretty(&file).unwrap_or_default()
+}
+
+fn add<B: Printed>(bus: &BusPlan<B>, file: &mut PlantFile) {
+    file.bus.push(bus_table(bus));
+    file.device.extend(bus.devices.iter().map(|device| device_table(device, bus)));
+    file.master.extend(bus.masters.iter().map(|master| B::master_table(master, bus)));
 }
 
 /// A value that stands nowhere in a text.
@@ -30,29 +60,45 @@ fn value<T>(value: T) -> Spanned<T> {
     Spanned::new(0..0, value)
 }
 
-fn bus_table(bus: &BusPlan) -> BusTable {
-    let is_virtual = matches!(bus.uri, codewheel_link::BusUri::Virtual(_));
-    BusTable {
-        name: value(bus.name.clone()),
-        kind: BusKind::DeviceNet,
-        uri: Some(value(bus.uri.to_string())),
-        baud: bus.bit_rate.into(),
-        loss: is_virtual.then(|| value(bus.faults.loss)),
-        corruption: is_virtual.then(|| value(bus.faults.corruption)),
-        seed: Some(value(bus.seed)),
-    }
+/// A probability, which only virtual buses have.
+fn probability<B: FieldBus>(bus: &BusPlan<B>, probability: f64) -> Option<Spanned<f64>> {
+    bus.is_virtual().then(|| value(probability))
 }
 
-fn device_table(device: &DevicePlan, bus: &BusPlan) -> DeviceTable {
-    let (address, switches) = switches(device.switches, bus.bit_rate);
+fn bus_table<B: Printed>(bus: &BusPlan<B>) -> BusTable {
+    let mut table = BusTable {
+        name: value(bus.name.clone()),
+        kind: B::KIND,
+        uri: Some(value(bus.uri.to_string())),
+        baud: Some(value(bus.bit_rate.to_string())),
+        cable_m: None,
+        loss: None,
+        corruption: None,
+        broken: None,
+        flipped: None,
+        pause: None,
+        seed: Some(value(bus.seed)),
+    };
+    B::bus(bus, &mut table);
+    table
+}
+
+fn device_table<B: Printed>(device: &DevicePlan<B>, bus: &BusPlan<B>) -> DeviceTable {
+    let (address, switches) = B::switches(device, bus);
     DeviceTable {
         name: Some(device.name.clone()),
         bus: Some(value(bus.name.clone())),
         model: value(device.product.model.to_owned()),
         address: address.map(|address| value(address.into())),
         switches: switches.map(value),
-        termination: device.switches.termination,
+        termination: crate::field_bus::Switches::termination(&device.switches),
         shaft: Some(value(device.shaft_text.clone())),
+        auto_baud: B::auto_baud(device).map(value),
+        ssi: match &device.sensor {
+            SensorPlan::Disc => None,
+            SensorPlan::Ssi(settings) => Some(value(ssi_table(settings, None))),
+            SensorPlan::SsiLine(settings, uri) => Some(value(ssi_table(settings, Some(uri)))),
+        },
         memory: device.memory.clone().map(value),
         serial: device.serial,
         duplicate: device.duplicate.then(|| value(true)),
@@ -60,18 +106,21 @@ fn device_table(device: &DevicePlan, bus: &BusPlan) -> DeviceTable {
     }
 }
 
-/// The address where it says everything, else the switches.
-fn switches(switches: Switches, rate: BitRate) -> (Option<u8>, Option<SwitchesValue>) {
-    let termination = switches.termination;
-    if (Switches { termination, ..Switches::set_to(switches.address(), rate) }) == switches {
-        return match switches.mac() {
-            Some(mac) => (Some(mac.value()), None),
-            None => (None, Some(SwitchesValue::Number(switches.address()))),
-        };
+fn ssi_table(settings: &Settings, line: Option<&SsiUri>) -> SsiTable {
+    SsiTable {
+        word: Some(value(settings.word.bits())),
+        code: Some(match settings.code {
+            Code::Gray => CodeName::Gray,
+            Code::Binary => CodeName::Binary,
+        }),
+        clock: Some(value(match settings.clock_hz {
+            hertz if hertz.is_multiple_of(1_000) => format!("{}k", hertz / 1_000),
+            hertz => hertz.to_string(),
+        })),
+        monoflop: Some(value(TimeSpan(settings.monoflop))),
+        line: line.map(|uri| value(uri.to_string())),
+        double_read: Some(settings.double_read),
     }
-    let Switches { rotary_1, rotary_2, dip_2, dip_3, .. } = switches;
-    let table = SwitchTable { rotary: [rotary_1, rotary_2], dip: Some([false, dip_2, dip_3]) };
-    (None, Some(SwitchesValue::Each(table)))
 }
 
 fn fault_table(fault: &Fault) -> FaultTable {
@@ -84,6 +133,7 @@ fn fault_table(fault: &Fault) -> FaultTable {
         count: None,
         probability: None,
         delay: None,
+        bits: None,
     };
     let kind = match fault.lever {
         Lever::Jump(steps) => {
@@ -105,6 +155,18 @@ fn fault_table(fault: &Fault) -> FaultTable {
             FaultKind::LateAnswers
         }
         Lever::BusOff => FaultKind::BusOff,
+        Lever::Ssi(None) => FaultKind::SsiRight,
+        Lever::Ssi(Some(ssi::Fault::Unplugged)) => FaultKind::SsiUnplugged,
+        Lever::Ssi(Some(ssi::Fault::Shorted)) => FaultKind::SsiShort,
+        Lever::Ssi(Some(ssi::Fault::NoMonoflop)) => FaultKind::SsiNoMonoflop,
+        Lever::Ssi(Some(ssi::Fault::WordLength(bits))) => {
+            table.bits = Some(value(bits.into()));
+            FaultKind::SsiWrongWord
+        }
+        Lever::Ssi(Some(ssi::Fault::FlippedBits(bits))) => {
+            table.bits = Some(value(bits));
+            FaultKind::SsiFlippedBits
+        }
         Lever::BadTransceiver { probability, .. } => {
             table.probability = Some(value(probability));
             FaultKind::BadTransceiver
@@ -112,43 +174,4 @@ fn fault_table(fault: &Fault) -> FaultTable {
     };
     table.kind = value(kind);
     table
-}
-
-fn master_table(master: &MasterPlan, bus: &BusPlan) -> MasterTable {
-    MasterTable {
-        name: Some(master.name.clone()),
-        kind: MasterKind::Scanner,
-        bus: Some(value(bus.name.clone())),
-        address: value(master.mac.value().into()),
-        interval: Some(TimeSpan(master.interval)),
-        interscan_delay: Some(TimeSpan(master.interscan_delay)),
-        termination: Some(master.termination),
-        duplicate: master.duplicate.then(|| value(true)),
-        slave: Some(master.slaves.iter().map(slave_table).collect()),
-    }
-}
-
-fn slave_table(slave: &SlavePlan) -> SlaveTable {
-    let millis = |millis: u16| value(TimeSpan(Duration::from_millis(u64::from(millis))));
-    let (connection, acknowledged, production_inhibit) = match slave.exchange {
-        Exchange::Poll => (Connection::Poll, None, None),
-        Exchange::Explicit => (Connection::Explicit, None, None),
-        Exchange::Change { trigger, acknowledged, production_inhibit } => {
-            let connection = match trigger {
-                Trigger::ChangeOfState => Connection::ChangeOfState,
-                Trigger::Cyclic => Connection::Cyclic,
-            };
-            (connection, Some(value(acknowledged)), Some(millis(production_inhibit)))
-        }
-    };
-    SlaveTable {
-        address: value(slave.mac.value().into()),
-        connection,
-        expected_packet_rate: Some(millis(slave.expected_packet_rate)),
-        acknowledged,
-        production_inhibit,
-        assembly: slave.assembly,
-        vendor: slave.identity.map(|(vendor, _)| value(vendor)),
-        product_code: slave.identity.map(|(_, code)| value(code)),
-    }
 }

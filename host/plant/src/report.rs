@@ -21,6 +21,13 @@ pub struct Report {
 pub enum What {
     /// The device tells it.
     Device(Event),
+    /// The device tells it again and again; only now and then it is reported.
+    Repeated {
+        /// What it tells.
+        event: Event,
+        /// How often, since it was reported last.
+        count: u64,
+    },
     /// A fault begins.
     FaultBegins(String),
     /// A fault that lasted is over.
@@ -29,6 +36,15 @@ pub enum What {
     SetAside(PathBuf),
     /// The memory did not take a record.
     NotKept(String),
+    /// A master tells it.
+    Master {
+        /// What messages call it.
+        name: String,
+        /// What it tells.
+        text: String,
+        /// Whether a person should look at it.
+        trouble: bool,
+    },
     /// The port tells it.
     Port(Notice),
     /// The bus is wired wrongly.
@@ -42,7 +58,8 @@ impl What {
     #[must_use]
     pub const fn is_trouble(&self) -> bool {
         match self {
-            Self::Device(event) => event.is_trouble(),
+            Self::Device(event) | Self::Repeated { event, .. } => event.is_trouble(),
+            Self::Master { trouble, .. } => *trouble,
             Self::Port(notice) => notice.is_trouble(),
             _ => true,
         }
@@ -60,6 +77,7 @@ impl fmt::Display for What {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Device(event) => event.fmt(f),
+            Self::Repeated { event, count } => write!(f, "{event} ({count} times)"),
             Self::FaultBegins(fault) => write!(f, "fault: {fault}"),
             Self::FaultEnds(fault) => write!(f, "fault over: {fault}"),
             Self::SetAside(path) => write!(
@@ -68,6 +86,7 @@ impl fmt::Display for What {
                 path.display()
             ),
             Self::NotKept(error) => f.write_str(error),
+            Self::Master { name, text, .. } => write!(f, "{name}: {text}"),
             Self::Port(notice) => notice.fmt(f),
             Self::Wiring(warning) => f.write_str(warning),
             Self::Lost(count) => write!(f, "{count} reports were lost before they were fetched"),

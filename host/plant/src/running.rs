@@ -8,10 +8,11 @@ use std::time;
 use codewheel_link::{Clock, LinkError, Waker};
 use codewheel_station::Duration;
 
-use crate::crew::{BusSnapshot, Manned, is_virtual};
-use crate::port_bus::open;
+use crate::field_bus::FieldBus;
+use crate::manned::Manned;
+use crate::plant::AnyBusPlan;
 use crate::report::prepend;
-use crate::{Plant, PortBus, StartError, VirtualBus};
+use crate::{BusPlan, BusSnapshot, DeviceNet, Plant, PortBus, Profibus, StartError, VirtualBus};
 
 /// How often a virtual bus catches up with the clock on the wall.
 const PACE: time::Duration = time::Duration::from_millis(5);
@@ -47,38 +48,66 @@ impl Plant {
     /// # Errors
     /// [`StartError`]; nothing is left half started.
     pub fn start(self, period: time::Duration) -> Result<Running, StartError> {
-        let manned: Vec<Manned> =
-            self.buses.into_iter().map(Manned::open).collect::<Result<_, _>>()?;
-        let mut ports = Vec::new();
-        for Manned { plan, .. } in &manned {
-            let real = !is_virtual(&plan.uri);
-            ports.push(real.then(|| open(&plan.uri, plan.bit_rate)).transpose()?);
-        }
+        let manned: Vec<AnyManned> =
+            self.buses.into_iter().map(AnyManned::open).collect::<Result<_, _>>()?;
+        let ready: Vec<AnyReady> =
+            manned.into_iter().map(AnyManned::join).collect::<Result<_, _>>()?;
         let clock = Clock::new();
         let shared = Arc::new(Shared::default());
-        shared.lock().snapshots.resize_with(manned.len(), || None);
-        let period = period.into();
-        let (mut uris, mut wakers, mut threads) = (Vec::new(), Vec::new(), Vec::new());
-        for (place, (manned, port)) in manned.into_iter().zip(ports).enumerate() {
-            let post = Post { shared: Arc::clone(&shared), place, clock, period };
-            threads.push(match port {
-                None => {
-                    uris.push(manned.plan.uri.to_string());
-                    let bus = VirtualBus::begin(manned);
-                    std::thread::spawn(move || {
-                        post.run_virtual(bus);
-                        Ok(())
-                    })
-                }
-                Some(port) => {
-                    let bus = PortBus::begin(manned, port, clock);
-                    uris.push(bus.uri().to_owned());
-                    wakers.push(bus.waker());
-                    std::thread::spawn(move || post.run_port(bus))
-                }
-            });
+        shared.lock().snapshots.resize_with(ready.len(), || None);
+        let mut running =
+            Running { shared, uris: Vec::new(), wakers: Vec::new(), threads: Vec::new() };
+        for (place, ready) in ready.into_iter().enumerate() {
+            let shared = Arc::clone(&running.shared);
+            let post = Post { shared, place, clock, period: period.into() };
+            match ready {
+                AnyReady::DeviceNet(ready) => running.run(ready, post),
+                AnyReady::Profibus(ready) => running.run(ready, post),
+            }
         }
-        Ok(Running { shared, uris, wakers, threads })
+        Ok(running)
+    }
+}
+
+/// A bus whose memories are open.
+enum AnyManned {
+    DeviceNet(Manned<DeviceNet>),
+    Profibus(Manned<Profibus>),
+}
+
+/// A bus whose port is open too, where it has one.
+enum AnyReady {
+    DeviceNet(Ready<DeviceNet>),
+    Profibus(Ready<Profibus>),
+}
+
+struct Ready<B: FieldBus> {
+    manned: Manned<B>,
+    port: Option<B::Port>,
+}
+
+impl AnyManned {
+    fn open(plan: AnyBusPlan) -> Result<Self, StartError> {
+        Ok(match plan {
+            AnyBusPlan::DeviceNet(plan) => Self::DeviceNet(Manned::open(plan)?),
+            AnyBusPlan::Profibus(plan) => Self::Profibus(Manned::open(plan)?),
+        })
+    }
+
+    fn join(self) -> Result<AnyReady, LinkError> {
+        Ok(match self {
+            Self::DeviceNet(manned) => AnyReady::DeviceNet(Ready::join(manned)?),
+            Self::Profibus(manned) => AnyReady::Profibus(Ready::join(manned)?),
+        })
+    }
+}
+
+impl<B: FieldBus> Ready<B> {
+    fn join(manned: Manned<B>) -> Result<Self, LinkError> {
+        let BusPlan { uri, bit_rate, .. } = &manned.plan;
+        let real = !manned.plan.is_virtual();
+        let port = real.then(|| B::open(uri, *bit_rate)).transpose()?;
+        Ok(Self { manned, port })
     }
 }
 
@@ -95,7 +124,7 @@ impl Post {
         self.shared.stop.load(Ordering::Relaxed)
     }
 
-    fn run_virtual(&self, mut bus: VirtualBus) {
+    fn run_virtual<B: FieldBus>(&self, mut bus: VirtualBus<B>) {
         let mut next = self.clock.now();
         while !self.stopped() {
             let now = self.clock.now();
@@ -110,7 +139,7 @@ impl Post {
         self.leave(bus.snapshot());
     }
 
-    fn run_port(&self, mut bus: PortBus) -> Result<(), LinkError> {
+    fn run_port<B: FieldBus>(&self, mut bus: PortBus<B>) -> Result<(), LinkError> {
         let mut next = self.clock.now();
         let mut result = Ok(());
         while !self.stopped() && result.is_ok() {
@@ -157,6 +186,27 @@ impl Shared {
 }
 
 impl Running {
+    /// Switches a bus on and gives it a thread.
+    fn run<B: FieldBus>(&mut self, Ready { manned, port }: Ready<B>, post: Post) {
+        let thread = match port {
+            None => {
+                self.uris.push(manned.plan.uri.to_string());
+                let bus = VirtualBus::begin(manned);
+                std::thread::spawn(move || {
+                    post.run_virtual(bus);
+                    Ok(())
+                })
+            }
+            Some(port) => {
+                let bus = PortBus::begin(manned, port, post.clock);
+                self.uris.push(bus.uri().to_owned());
+                self.wakers.push(bus.waker());
+                std::thread::spawn(move || post.run_port(bus))
+            }
+        };
+        self.threads.push(thread);
+    }
+
     /// Where each bus is, in the order of the plan, with the port it really got.
     #[must_use]
     pub fn uris(&self) -> &[String] {

@@ -1,61 +1,62 @@
 //! A bus in virtual time: a simulated wire with its devices and masters.
 
-use codewheel_sim::can::{Event, NodeId, Statistics, Wire};
 use codewheel_station::Instant;
 
-use crate::crew::{BusSnapshot, Crew, Manned, Medium, Member, seed_at};
+use crate::crew::{Crew, Medium, Member};
+use crate::field_bus::{FieldBus, Line, PlannedMaster, Switches};
+use crate::manned::{Manned, seed_at};
 use crate::report::What;
-use crate::{BusPlan, MemoryError};
+use crate::{BusPlan, BusSnapshot, DeviceNet, StartError};
 
 /// A bus in virtual time, which begins at zero. Whoever owns it moves the time on.
 ///
 /// The same plan gives the same course of events, to the bit, as long as its devices have no memory
 /// files that change it.
 #[derive(Debug)]
-pub struct VirtualBus {
+pub struct VirtualBus<B: FieldBus = DeviceNet> {
     uri: String,
-    segment: Segment,
-    crew: Crew,
-    seen: Statistics,
+    segment: Segment<B>,
+    crew: Crew<B>,
+    seen: <B::Line as Line<B>>::Statistics,
 }
 
 /// A wire whose stations have places and can lose their power.
 #[derive(Debug)]
-struct Segment {
-    wire: Wire<Member>,
-    places: Vec<Place>,
+struct Segment<B: FieldBus> {
+    wire: B::Line,
+    places: Vec<Place<B>>,
 }
 
 #[derive(Debug)]
-struct Place {
+struct Place<B: FieldBus> {
     name: String,
     terminated: bool,
     /// `None` while it has no power.
-    id: Option<NodeId>,
+    id: Option<<B::Line as Line<B>>::Id>,
     corruption: Option<f64>,
 }
 
-impl VirtualBus {
+impl<B: FieldBus> VirtualBus<B> {
     /// Opens the memory files and switches everything on.
     ///
     /// # Errors
-    /// [`MemoryError`]; nothing is left half started.
-    pub fn power_up(plan: BusPlan) -> Result<Self, MemoryError> {
+    /// [`StartError`]; nothing is left half started.
+    pub fn power_up(plan: BusPlan<B>) -> Result<Self, StartError> {
         Ok(Self::begin(Manned::open(plan)?))
     }
 
-    pub(crate) fn begin(manned: Manned) -> Self {
+    pub(crate) fn begin(manned: Manned<B>) -> Self {
         let plan = &manned.plan;
         // The seed of the wire itself is that of no place.
-        let mut wire = Wire::new(plan.bit_rate, seed_at(plan.seed, u32::MAX as usize));
-        wire.set_faults(plan.faults);
+        let wire = B::Line::new(plan, seed_at(plan.seed, u32::MAX as usize));
         let devices = plan.devices.iter().map(|device| {
-            let name = format!("{} at {}", device.product.title, device.switches.address());
-            (name, device.switches.termination)
+            let name = format!("{} at {}", device.product.title, device.switches.position());
+            (name, device.switches.termination())
         });
-        let masters = plan.masters.iter();
-        let masters =
-            masters.map(|master| (format!("scanner at {}", master.mac), master.termination));
+        let masters = plan.masters.iter().map(|master| {
+            let name = format!("{} at {}", B::MasterPlan::KIND, master.address());
+            (name, master.termination())
+        });
         let places = devices
             .chain(masters)
             .map(|(name, terminated)| Place { name, terminated, id: None, corruption: None })
@@ -73,7 +74,11 @@ impl VirtualBus {
     }
 
     /// Runs the bus up to `until`. `observer` sees what happens on the wire.
-    pub fn run_until(&mut self, until: Instant, observer: &mut impl FnMut(&Event)) {
+    pub fn run_until(
+        &mut self,
+        until: Instant,
+        observer: &mut impl FnMut(&<B::Line as Line<B>>::Event),
+    ) {
         while let Some(at) = self.crew.next_fault().filter(|at| *at <= until) {
             self.segment.wire.run_until(at, observer);
             self.crew.pull_levers(at, &mut self.segment);
@@ -84,14 +89,15 @@ impl VirtualBus {
     /// The bus now. What it reports is taken out.
     pub fn snapshot(&mut self) -> BusSnapshot {
         let statistics = self.segment.wire.statistics();
-        let load = statistics.bus_load_since(&self.seen);
+        let load = B::Line::load(&statistics, &self.seen);
         self.seen = statistics;
-        self.crew.snapshot(statistics.at, self.uri.clone(), Some(load), &mut self.segment)
+        let at = self.segment.wire.now();
+        self.crew.snapshot(at, self.uri.clone(), Some(load), &mut self.segment)
     }
 
     /// What has been counted on the wire.
     #[must_use]
-    pub fn statistics(&self) -> Statistics {
+    pub fn statistics(&self) -> <B::Line as Line<B>>::Statistics {
         self.segment.wire.statistics()
     }
 
@@ -102,40 +108,39 @@ impl VirtualBus {
     }
 }
 
-impl Segment {
-    fn id(&self, place: usize) -> Option<NodeId> {
+impl<B: FieldBus> Segment<B> {
+    fn id(&self, place: usize) -> Option<<B::Line as Line<B>>::Id> {
         self.places.get(place)?.id
     }
 }
 
-impl Medium for Segment {
-    fn plug_in(&mut self, place: usize, station: Member) {
+impl<B: FieldBus> Medium<B> for Segment<B> {
+    fn plug_in(&mut self, place: usize, station: Member<B>) {
         let Some(Place { name, terminated, id, corruption }) = self.places.get_mut(place) else {
             return;
         };
-        let filters = station.filters();
-        let node = self.wire.attach(name.clone(), station, &filters, *terminated);
+        let node = self.wire.attach(name.clone(), station, *terminated);
         self.wire.set_corruption_at(node, *corruption);
         *id = Some(node);
     }
 
-    fn unplug(&mut self, place: usize) -> Option<Member> {
+    fn unplug(&mut self, place: usize) -> Option<Member<B>> {
         let id = self.places.get_mut(place)?.id.take()?;
         self.wire.detach(id)
     }
 
-    fn station(&self, place: usize) -> Option<&Member> {
+    fn station(&self, place: usize) -> Option<&Member<B>> {
         self.wire.node(self.id(place)?)
     }
 
-    fn station_mut(&mut self, place: usize) -> Option<&mut Member> {
+    fn station_mut(&mut self, place: usize) -> Option<&mut Member<B>> {
         let id = self.id(place)?;
         self.wire.node_mut(id)
     }
 
     fn bus_off(&mut self, place: usize, _: Instant) {
         if let Some(id) = self.id(place) {
-            self.wire.bus_off(id, &mut |_| {});
+            self.wire.bus_off(id);
         }
     }
 

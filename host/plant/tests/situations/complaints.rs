@@ -53,7 +53,7 @@ fn a_missing_key_shows_its_table() {
 #[test]
 fn a_value_that_is_none_shows_what_is_allowed() {
     refused(&format!("{BUS}baud = \"1M\"\n"), 3, "\"1M\"", &["`125k`, `250k`, `500k`"]);
-    refused(&format!("{BUS}kind = \"profibus\"\n"), 3, "\"prof", &["devicenet"]);
+    refused(&format!("{BUS}kind = \"modbus\"\n"), 3, "\"mod", &["devicenet", "profibus"]);
     refused(&format!("{BUS}uri = \"can0\"\n"), 3, "\"can0\"", &["slcan-listen:HOST:PORT"]);
     refused(&format!("{BUS}loss = 1.5\n"), 3, "1.5", &["0 to 1"]);
     refused(&format!("{BUS}loss = nan\n"), 3, "nan", &["0 to 1"]);
@@ -201,9 +201,11 @@ fn a_file_that_cannot_be_read_is_named() {
 
 #[test]
 fn no_text_panics() {
-    let whole = std::fs::read_to_string(super::example("faults.toml")).unwrap();
+    let read = |name| std::fs::read_to_string(super::example(name)).unwrap();
+    let wholes = [read("faults.toml"), read("profibus-faults.toml")];
     let mut random = fastrand::Rng::with_seed(5);
-    for _ in 0..2_000 {
+    for round in 0..2_000 {
+        let whole = &wholes[round % 2];
         let mut octets = whole.clone().into_bytes();
         for _ in 0..random.usize(1..4) {
             let at = random.usize(..octets.len());
@@ -219,6 +221,141 @@ fn no_text_panics() {
             assert!(complaint.line() > 0 && !complaint.to_string().is_empty());
         }
     }
+}
+
+const FIELD: &str = "[[bus]]\nname = \"f\"\nkind = \"profibus\"\n";
+const SLAVE: &str = "[[device]]\nmodel = \"amg11-p29\"\naddress = 7\n";
+
+#[test]
+fn a_rate_of_the_other_bus_is_refused_with_those_of_this_one() {
+    let text = format!("{FIELD}baud = \"125k\"\n");
+    refused(&text, 4, "\"125k\"", &["no rate of a PROFIBUS", "`9.6k`", "`12M`"]);
+    let text = format!("{BUS}baud = \"1.5M\"\n");
+    refused(&text, 3, "\"1.5M\"", &["no rate of a DeviceNet", "`125k`"]);
+}
+
+#[test]
+fn a_cable_is_no_longer_than_its_rate_allows() {
+    let cable = |baud: &str, metres: u32| format!("{FIELD}baud = \"{baud}\"\ncable_m = {metres}\n");
+    refused(&cable("1.5M", 250), 5, "250", &["at 1.5M it is at most 200 m", "or take 500k"]);
+    refused(&cable("9.6k", 1_300), 5, "1300", &["at most 1200 m", "repeater"]);
+    for (baud, longest) in
+        [("9.6k", 1_200), ("187.5k", 1_000), ("500k", 400), ("1.5M", 200), ("12M", 100)]
+    {
+        assert!(Plant::parse(&cable(baud, longest), "p", Path::new("")).is_ok(), "{baud}");
+        refused(&cable(baud, longest + 1), 5, "", &[&format!("at most {longest} m")]);
+    }
+    refused(&format!("{BUS}cable_m = 10\n"), 3, "10", &["`cable_m` means nothing", "PROFIBUS"]);
+}
+
+#[test]
+fn a_bus_is_where_its_medium_is() {
+    let text = format!("{FIELD}uri = \"slcan:127.0.0.1:4001\"\n");
+    refused(&text, 4, "\"slcan", &["carries CAN", "PROFIBUS runs on RS-485", "rs485-listen:"]);
+    let text = format!("{BUS}uri = \"rs485:/dev/ttyUSB0\"\n");
+    refused(&text, 3, "\"rs485", &["carries RS-485", "DeviceNet runs on CAN", "slcan-listen:"]);
+}
+
+#[test]
+fn a_device_and_a_master_belong_to_their_bus() {
+    let text = format!("{FIELD}{DEVICE}");
+    refused(&text, 5, "\"amg11-d29\"", &["speaks DeviceNet", "f is a PROFIBUS", "heag162-p18"]);
+    refused(&format!("{BUS}{SLAVE}"), 4, "\"amg11-p29\"", &["speaks PROFIBUS", "amg11-d29"]);
+    let text = format!("{FIELD}[[master]]\nkind = \"scanner\"\naddress = 2\n");
+    refused(&text, 5, "\"scanner\"", &["its masters are of kind \"dp-master\""]);
+    let text = format!("{FIELD}[[master]]\naddress = 2\ninterval = \"10ms\"\n");
+    refused(&text, 6, "\"10ms\"", &["`interval` means nothing", "scanner"]);
+    let text = format!("{BUS}[[master]]\naddress = 2\nslot_bits = 300\n");
+    refused(&text, 5, "300", &["`slot_bits` means nothing", "DP master"]);
+    let text = format!("{BUS}{DEVICE}auto_baud = true\n");
+    refused(&text, 6, "true", &["`auto_baud` means nothing"]);
+}
+
+#[test]
+fn a_profibus_address_is_what_two_rotary_switches_say() {
+    for address in ["100", "-1", "300"] {
+        let text = format!("{FIELD}[[device]]\nmodel = \"amg11-p29\"\naddress = {address}\n");
+        refused(&text, 6, address, &["0–99"]);
+    }
+    let text = format!(
+        "{FIELD}[[device]]\nmodel = \"amg11-p29\"\nswitches = {{ rotary = [0, 7], dip = [true, true, true] }}\n"
+    );
+    refused(&text, 6, "{ rotary", &["no DIP switches", "termination = true"]);
+    refused(&format!("{FIELD}[[master]]\naddress = 126\n"), 5, "126", &["0–125"]);
+    let text = format!("{FIELD}{SLAVE}{SLAVE}");
+    refused(&text, 9, "7", &["line 6 has address 7", "duplicate = true"]);
+}
+
+#[test]
+fn a_rate_is_searched_only_where_there_is_one() {
+    for uri in ["rs485-listen:127.0.0.1:0", "rs485-listen:pty:./pb", "rs485:127.0.0.1:4002"] {
+        let text = format!("{FIELD}uri = \"{uri}\"\n{SLAVE}auto_baud = true\n");
+        refused(&text, 8, "true", &["no rate to search for"]);
+    }
+    let text = format!("{FIELD}uri = \"rs485:/dev/ttyUSB0\"\n{SLAVE}auto_baud = true\n");
+    assert!(Plant::parse(&text, "p", Path::new("")).is_ok());
+}
+
+#[test]
+fn an_ssi_line_is_for_a_converter_and_read_as_it_can_be() {
+    let text = format!("{FIELD}{SLAVE}ssi = {{ word = 29 }}\n");
+    refused(&text, 7, "{ word", &["`ssi` means nothing", "amg11-p29 has a shaft"]);
+    let ssi = |keys: &str| {
+        format!("{FIELD}[[device]]\nmodel = \"heag162-p29\"\naddress = 7\nssi = {{ {keys} }}\n")
+    };
+    refused(&ssi("word = 13"), 7, "13", &["no words of 13 bits", "29 or 25"]);
+    refused(&ssi("clock = \"2M\""), 7, "\"2M\"", &["100000 to 1000000"]);
+    refused(&ssi("clock = \"fast\""), 7, "\"fast\"", &["as 500k"]);
+    refused(&ssi("monoflop = \"1us\""), 7, "\"1us\"", &["longer than a period"]);
+    refused(&ssi("code = \"grey\""), 7, "\"grey\"", &["`gray`", "`binary`"]);
+    refused(&ssi("line = \"/dev/spidev0.0\""), 7, "\"/dev", &["spidev:FILE"]);
+    let fault = |kind: &str, line: usize, parts: &[&str]| {
+        let text = format!("{FIELD}{SLAVE}[[device.fault]]\nat = \"1s\"\nkind = \"{kind}\"\n");
+        refused(&text, line, &format!("\"{kind}"), parts);
+    };
+    fault("ssi-short", 9, &["amg11-p29 has no SSI line"]);
+    fault("bus-off", 9, &["for CAN"]);
+    fault("cell-low", 9, &["no lithium cell"]);
+    let fault = "\n[[device.fault]]\nat = \"1s\"\nkind = ";
+    let real = ssi("line = \"spidev:/dev/spidev0.0\"");
+    refused(&format!("{real}{fault}\"jump\"\nsteps = 1\n"), 11, "\"jump", &["fails by itself"]);
+    let text = format!("{}{fault}\"ssi-wrong-word\"\nbits = 33\n", ssi(""));
+    refused(&text, 12, "33", &["1 to 32"]);
+}
+
+#[test]
+fn a_dp_master_takes_settings_that_there_are() {
+    let master = |keys: &str| format!("{FIELD}[[master]]\naddress = 2\n{keys}\n");
+    refused(&master("slot_bits = 20"), 6, "20", &["300 to 16383"]);
+    refused(&master("min_station_delay = 5"), 6, "5", &["11 to 255"]);
+    refused(&master("retries = 0"), 6, "0", &["1 to 15"]);
+    refused(&master("watchdog = \"1ms\""), 6, "\"1ms\"", &["10 ms to 650 s"]);
+    refused(&master("highest_station_address = 2"), 6, "2", &["above"]);
+    refused(&master("gap_wait_rotations = 101"), 6, "101", &["1 to 100"]);
+    refused(&master("token_rotation_bits = 1"), 6, "1", &["256"]);
+}
+
+#[test]
+fn a_slave_of_a_dp_master_takes_what_its_class_and_configuration_have() {
+    let slave = |keys: &str| {
+        format!("{FIELD}[[master]]\naddress = 2\n[[master.slave]]\naddress = 7\n{keys}\n")
+    };
+    refused(&slave("class = 3"), 8, "3", &["1 or 2"]);
+    refused(&slave("configuration = \"E0\""), 8, "\"E0\"", &["`F1`", "`D0`"]);
+    refused(&slave("class = 1\nscaling = true"), 9, "true", &["class 1 has no scaling"]);
+    refused(&slave("class = 1\nsteps_per_turn = 9"), 9, "9", &["without scaling"]);
+    refused(&slave("groups = [0]"), 8, "[0]", &["1 to 8"]);
+    refused(&slave("assembly = 2"), 8, "2", &["`assembly` means nothing"]);
+    let preset = "[[master.slave.preset]]\nat = \"1s\"\nvalue = ";
+    let with = |keys: &str, value: &str| slave(&format!("{keys}\n{preset}{value}"));
+    refused(&with("configuration = \"D1\"", "1"), 10, "\"1s\"", &["D1 carries no preset"]);
+    refused(&with("class = 1", "1"), 10, "\"1s\"", &["class 1 has no preset"]);
+    refused(&with("configuration = \"F0\"", "32768"), 11, "32768", &["15 bits"]);
+    refused(&with("", "2147483648"), 11, "2147483648", &["31 bits"]);
+    let text = with("", &format!("1\n{}2", preset.replace("1s", "500ms")));
+    refused(&text, 13, "\"500ms\"", &["in the order of their time"]);
+    let text = slave("[[master.slave]]\naddress = 7");
+    refused(&text, 9, "7", &["in the scan list already"]);
 }
 
 #[test]

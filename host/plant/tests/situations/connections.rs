@@ -1,8 +1,7 @@
 //! The ways a scanner fetches the data of its slaves, from the plant file to the wire.
 
 use codewheel_devicenet::connection::State;
-use codewheel_devicenet::scanner::SlaveState;
-use codewheel_plant::VirtualBus;
+use codewheel_plant::{SlaveState, VirtualBus};
 
 use super::{at, device, only_bus, plant};
 
@@ -61,7 +60,8 @@ fn each_slave_exchanges_its_data_the_way_the_plan_says() {
     }
     let state = |name| {
         let device = device(&snapshot, name).device.as_ref().unwrap();
-        (device.poll, device.change_of_state, device.explicit.is_some())
+        let network = device.devicenet().expect("a DeviceNet device");
+        (network.poll, network.change_of_state, network.explicit.is_some())
     };
     assert_eq!(state("polled"), (Some(State::Established), None, true));
     assert_eq!(state("cyclic"), (None, Some(State::Established), true));

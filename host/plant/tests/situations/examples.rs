@@ -1,11 +1,11 @@
 use std::path::Path;
 
-use codewheel_devicenet::scanner::SlaveState;
-use codewheel_plant::{Plant, VirtualBus};
+use codewheel_plant::{AnyBusPlan, FieldBus, Plant, SlaveState, VirtualBus};
 
-use super::{at, device, example, only_bus};
+use super::{at, device, example, only_bus, plant};
 
-const EXAMPLES: [&str; 3] = ["demo.toml", "commissioning.toml", "faults.toml"];
+const EXAMPLES: [&str; 5] =
+    ["demo.toml", "commissioning.toml", "faults.toml", "profibus.toml", "profibus-faults.toml"];
 
 #[test]
 fn the_printed_plant_reads_back_to_the_same_plant_and_text() {
@@ -72,17 +72,116 @@ fn a_plant_with_every_key_reads_back_too() {
 }
 
 #[test]
+fn a_profibus_with_every_key_reads_back_too() {
+    let text = r#"
+        [[bus]]
+        name = "a"
+        kind = "profibus"
+        baud = "93.75k"
+        cable_m = 1200
+        loss = 0.5
+        corruption = 0.25
+        broken = 0.125
+        flipped = 0.0625
+        pause = 1.0
+        seed = 1
+        [[bus]]
+        name = "b"
+        kind = "profibus"
+        uri = "rs485:/dev/ttyUSB0"
+        baud = "19200"
+        [[device]]
+        bus = "a"
+        model = "HEAG162-P29"
+        switches = { rotary = [9, 9] }
+        termination = true
+        auto_baud = false
+        shaft = "turn rpm=1"
+        ssi = { word = 25, code = "binary", clock = "0.25M", monoflop = "30us", double_read = true }
+        fault = [
+            { at = "1s", kind = "ssi-unplugged" }, { at = "2s", kind = "ssi-short" },
+            { at = "3s", kind = "ssi-wrong-word", bits = 29 }, { at = "4s", kind = "ssi-right" },
+            { at = "5s", kind = "ssi-no-monoflop" },
+            { at = "6s", kind = "ssi-flipped-bits", bits = 4096 },
+        ]
+        [[device]]
+        bus = "b"
+        model = "heag162-p13"
+        switches = 0
+        auto_baud = true
+        ssi = { line = "spidev:/dev/spidev0.0" }
+        [[master]]
+        bus = "a"
+        kind = "dp-master"
+        address = 125
+        slot_bits = 1000
+        min_station_delay = 100
+        watchdog = "0s"
+        highest_station_address = 126
+        gap_wait_rotations = 100
+        retries = 15
+        token_rotation_bits = 256
+        termination = false
+        [[master.slave]]
+        address = 99
+        class = 1
+        configuration = "D0"
+        direction = "ccw"
+        groups = [1, 8]
+        [[master.slave]]
+        address = 98
+        configuration = "F0"
+        scaling = true
+        steps_per_turn = 3600
+        [[master.slave.preset]]
+        at = "1s"
+        value = 32767
+        [[master]]
+        bus = "b"
+        address = 1
+    "#;
+    let before = plant(text);
+    let printed = before.to_text();
+    let again = plant(&printed);
+    assert_eq!(again, before, "{printed}");
+    assert_eq!(again.to_text(), printed);
+    for part in ["baud = \"19.2k\"", "clock = \"250k\"", "total_resolution = 235929600"] {
+        assert!(printed.contains(part), "{part}\n{printed}");
+    }
+}
+
+#[test]
 fn the_demo_polls_three_encoders_and_sees_what_their_shafts_do() {
-    let plan = only_bus(Plant::load(&example("demo.toml")).unwrap());
-    let mut bus = VirtualBus::power_up(plan).unwrap();
+    let [AnyBusPlan::DeviceNet(plan), _] =
+        <[AnyBusPlan; 2]>::try_from(Plant::load(&example("demo.toml")).unwrap().buses).unwrap()
+    else {
+        panic!("a DeviceNet first")
+    };
+    let rate = the_demo_moves(VirtualBus::power_up(plan).unwrap());
+    assert!((99.0..=101.0).contains(&rate), "{rate}");
+}
+
+#[test]
+fn the_profibus_of_the_demo_does_too_as_fast_as_it_can() {
+    let [_, AnyBusPlan::Profibus(plan)] =
+        <[AnyBusPlan; 2]>::try_from(Plant::load(&example("demo.toml")).unwrap().buses).unwrap()
+    else {
+        panic!("a PROFIBUS second")
+    };
+    let rate = the_demo_moves(VirtualBus::power_up(plan).unwrap());
+    assert!(rate > 500.0, "{rate}");
+}
+
+/// Sees three encoders polled whose shafts turn; answers a second of the first.
+fn the_demo_moves<B: FieldBus>(mut bus: VirtualBus<B>) -> f64 {
     let first = at(&mut bus, 3_000);
-    assert!(first.reports.is_empty(), "it is wired well: {:?}", first.reports);
+    let trouble = first.reports.iter().any(|report| report.what.is_trouble());
+    assert!(!trouble, "it is wired well: {:?}", first.reports);
     let second = at(&mut bus, 4_000);
     assert_eq!(second.devices.len(), 3);
     for (before, after) in first.devices.iter().zip(&second.devices) {
         let (master, device) = (after.master.as_ref().unwrap(), after.device.as_ref().unwrap());
         assert_eq!(master.state, SlaveState::Running);
-        assert!((99.0..=101.0).contains(&master.answers_per_second));
         assert_ne!(before.master.as_ref().unwrap().position, master.position, "the shaft turns");
         assert_ne!(device.velocity, 0);
         let off = i64::from(device.position) - i64::from(master.position.unwrap());
@@ -90,6 +189,7 @@ fn the_demo_polls_three_encoders_and_sees_what_their_shafts_do() {
     }
     assert!(second.load.is_some_and(|load| load > 0.01 && load < 0.9));
     assert!(second.masters[0].on_line && second.masters[0].cycle.count > 90);
+    second.devices[0].master.unwrap().answers_per_second
 }
 
 #[test]
@@ -129,13 +229,23 @@ fn keys(schema: &serde_json::Value) -> Vec<String> {
 fn the_schema_knows_every_key_that_is_printed_and_forbids_others() {
     let schema: serde_json::Value = serde_json::from_str(&codewheel_plant::schema()).unwrap();
     let known = keys(&schema);
-    let text = Plant::load(&example("faults.toml")).unwrap().to_text();
+    let text = |name| Plant::load(&example(name)).unwrap().to_text();
+    let text = text("faults.toml") + &text("profibus-faults.toml");
     for line in text.lines().filter_map(|line| line.split_once(" = ")) {
         assert!(known.iter().any(|key| key == line.0), "{}", line.0);
     }
-    for table in ["BusTable", "DeviceTable", "FaultTable", "MasterTable", "SlaveTable"] {
+    let tables = [
+        "BusTable",
+        "DeviceTable",
+        "SsiTable",
+        "FaultTable",
+        "MasterTable",
+        "SlaveTable",
+        "PresetTable",
+    ];
+    for table in tables {
         assert_eq!(schema["$defs"][table]["additionalProperties"], false, "{table}");
     }
     let models = schema["$defs"]["DeviceTable"]["properties"]["model"]["enum"].as_array();
-    assert_eq!(models.map(Vec::len), Some(10));
+    assert_eq!(models.map(Vec::len), Some(23));
 }

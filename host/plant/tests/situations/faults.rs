@@ -1,5 +1,4 @@
-use codewheel_devicenet::scanner::SlaveState;
-use codewheel_plant::{Plant, VirtualBus};
+use codewheel_plant::{Plant, SlaveState, VirtualBus};
 use codewheel_sim::can::{Event, candump_line};
 
 use super::{at, device, example, millis, only_bus, plant, told};

@@ -4,13 +4,17 @@ mod complaints;
 mod connections;
 mod examples;
 mod faults;
+mod one_line;
 mod one_port;
 mod power_cuts;
+mod profibus;
 mod running;
 
 use std::path::{Path, PathBuf};
 
-use codewheel_plant::{BusPlan, BusSnapshot, DeviceSnapshot, Plant, VirtualBus};
+use codewheel_plant::{
+    AnyBusPlan, BusPlan, BusSnapshot, DeviceSnapshot, FieldBus, Plant, Profibus, VirtualBus,
+};
 use codewheel_station::{Duration, Instant};
 
 /// The plant that `text` describes.
@@ -20,11 +24,22 @@ fn plant(text: &str) -> Plant {
         .unwrap_or_else(|complaint| panic!("{complaint}"))
 }
 
-/// Its only bus.
+/// Its only bus, a DeviceNet.
 #[track_caller]
 fn only_bus(plant: Plant) -> BusPlan {
-    let [bus] = <[BusPlan; 1]>::try_from(plant.buses).expect("one bus");
-    bus
+    match <[AnyBusPlan; 1]>::try_from(plant.buses) {
+        Ok([AnyBusPlan::DeviceNet(bus)]) => bus,
+        other => panic!("not one DeviceNet: {other:?}"),
+    }
+}
+
+/// Its only bus, a PROFIBUS.
+#[track_caller]
+fn only_profibus(plant: Plant) -> BusPlan<Profibus> {
+    match <[AnyBusPlan; 1]>::try_from(plant.buses) {
+        Ok([AnyBusPlan::Profibus(bus)]) => bus,
+        other => panic!("not one PROFIBUS: {other:?}"),
+    }
 }
 
 fn example(name: &str) -> PathBuf {
@@ -36,7 +51,7 @@ fn millis(millis: u64) -> Instant {
 }
 
 /// Runs a bus and gives its snapshot.
-fn at(bus: &mut VirtualBus, millis_from_start: u64) -> BusSnapshot {
+fn at<B: FieldBus>(bus: &mut VirtualBus<B>, millis_from_start: u64) -> BusSnapshot {
     bus.run_until(millis(millis_from_start), &mut |_| {});
     bus.snapshot()
 }

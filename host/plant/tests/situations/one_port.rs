@@ -4,9 +4,8 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
-use codewheel_devicenet::scanner::SlaveState;
 use codewheel_link::Clock;
-use codewheel_plant::{BusSnapshot, PortBus};
+use codewheel_plant::{BusSnapshot, PortBus, SlaveState};
 
 use super::{device, millis, only_bus, plant};
 

@@ -6,6 +6,8 @@ use codewheel_sim::can::Node;
 use codewheel_station::can::{Frame, Identifier, Input};
 use codewheel_station::{Instant, Station, earlier};
 
+use crate::seats::Seats;
+
 /// Frames remembered until they are reported as sent.
 const ON_THE_WAY: usize = 64;
 
@@ -13,11 +15,10 @@ const ON_THE_WAY: usize = 64;
 /// say the lowest identifier goes first, as on a wire.
 ///
 /// Each hears the others at the moment their frame is handed over, not when it is reported as sent:
-/// a port may take a tenth of a second for that, and their answers do not wait so long. Stations
-/// have places; an empty place is a station without power.
+/// a port may take a tenth of a second for that, and their answers do not wait so long.
 #[derive(Debug)]
 pub(crate) struct Composite<S> {
-    seats: Vec<Option<Seat<S>>>,
+    seats: Seats<Seat<S>>,
     /// Frames handed over and not reported as sent, oldest first, with the place of their sender.
     on_the_way: VecDeque<(Frame, usize)>,
 }
@@ -33,34 +34,31 @@ struct Seat<S> {
 
 impl<S: Node> Composite<S> {
     pub(crate) const fn new() -> Self {
-        Self { seats: Vec::new(), on_the_way: VecDeque::new() }
+        Self { seats: Seats::new(), on_the_way: VecDeque::new() }
     }
 
     /// Puts a station on `place`.
     pub(crate) fn put(&mut self, place: usize, station: S) {
-        if self.seats.len() <= place {
-            self.seats.resize_with(place + 1, || None);
-        }
-        self.seats[place] = Some(Seat { station, mailbox: None, off_until: None });
+        self.seats.put(place, Seat { station, mailbox: None, off_until: None });
     }
 
     /// Takes the station from `place`; what it was about to say is gone.
     pub(crate) fn take(&mut self, place: usize) -> Option<S> {
         self.on_the_way.retain(|(_, sender)| *sender != place);
-        Some(self.seats.get_mut(place)?.take()?.station)
+        Some(self.seats.take(place)?.station)
     }
 
     pub(crate) fn station(&self, place: usize) -> Option<&S> {
-        self.seats.get(place)?.as_ref().map(|seat| &seat.station)
+        self.seats.get(place).map(|seat| &seat.station)
     }
 
     pub(crate) fn station_mut(&mut self, place: usize) -> Option<&mut S> {
-        self.seats.get_mut(place)?.as_mut().map(|seat| &mut seat.station)
+        self.seats.get_mut(place).map(|seat| &mut seat.station)
     }
 
     /// Lets the controller of one station leave the bus until `until`.
     pub(crate) fn bus_off(&mut self, place: usize, now: Instant, until: Instant) {
-        let Some(Some(seat)) = self.seats.get_mut(place) else { return };
+        let Some(seat) = self.seats.get_mut(place) else { return };
         if seat.off_until.is_none() {
             seat.off_until = Some(until);
             seat.mailbox = None;
@@ -71,10 +69,7 @@ impl<S: Node> Composite<S> {
 
     /// Those that take part, with their places.
     fn present(&mut self) -> impl Iterator<Item = (usize, &mut Seat<S>)> {
-        let seats = self.seats.iter_mut().enumerate();
-        seats
-            .filter_map(|(place, seat)| Some((place, seat.as_mut()?)))
-            .filter(|(_, seat)| seat.off_until.is_none())
+        self.seats.iter_mut().filter(|(_, seat)| seat.off_until.is_none())
     }
 
     fn sent(&mut self, now: Instant, frame: &Frame) {
@@ -112,7 +107,7 @@ impl<S: Node> Station for Composite<S> {
     }
 
     fn advance(&mut self, now: Instant) {
-        for seat in self.seats.iter_mut().flatten() {
+        for (_, seat) in self.seats.iter_mut() {
             if seat.off_until.take_if(|until| *until <= now).is_some() {
                 seat.station.handle(now, Input::Recovered);
             }
@@ -131,7 +126,7 @@ impl<S: Node> Station for Composite<S> {
         };
         let waiting = self.present().filter_map(|(place, seat)| Some((rank(seat)?, place)));
         let (_, sender) = waiting.min()?;
-        let frame = self.seats[sender].as_mut()?.mailbox.take()?;
+        let frame = self.seats.get_mut(sender)?.mailbox.take()?;
         for (place, seat) in self.present() {
             if place != sender {
                 seat.station.handle(now, Input::Frame(&frame));
@@ -147,8 +142,7 @@ impl<S: Node> Station for Composite<S> {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        let seats = self.seats.iter().flatten();
-        seats.fold(None, |least, seat| {
+        self.seats.iter().fold(None, |least, seat| {
             earlier(least, earlier(seat.station.deadline(), seat.off_until))
         })
     }

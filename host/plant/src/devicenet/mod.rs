@@ -1,0 +1,246 @@
+//! DeviceNet in a plant.
+
+mod composite;
+mod plan;
+mod scanner;
+
+use codewheel_device::{DeviceNetEncoder, Event, Factory, Snapshot, product};
+use codewheel_devicenet::scanner::Scanner;
+use codewheel_encoder::{Kept, Start};
+use codewheel_link::{BusUri, CanPort, Clock, LinkError, Loop, Notice, Waker};
+use codewheel_sim::can::{self, Faults, NodeId, Statistics, Wire};
+use codewheel_sim::{Drops, Troubled};
+use codewheel_station::can::{BitRate, Filter, Frame, Input};
+use codewheel_station::{Duration, Instant};
+
+use self::composite::Composite;
+use crate::crew::{Medium, Member};
+use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
+use crate::sensor::PlantSensor;
+use crate::{BusPlan, MemoryError, StartError};
+
+pub use plan::{Exchange, MasterPlan, SlavePlan};
+
+/// DeviceNet, as the type parameter of plans and buses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeviceNet {}
+
+impl FieldBus for DeviceNet {
+    const BUS: product::Bus = product::Bus::DeviceNet;
+
+    type Rate = BitRate;
+    type Cable = ();
+    type Faults = Faults;
+    type Switches = codewheel_device::Switches;
+    type Options = ();
+    type MasterPlan = MasterPlan;
+
+    type Input<'a> = Input<'a>;
+    type Output = Frame;
+    type Encoder = Troubled<DeviceNetEncoder<PlantSensor>>;
+    type Master = Scanner;
+    type Line = Wire<Member<Self>>;
+    type Stations = Stations;
+    type Port = Box<dyn CanPort>;
+    type Loop = Loop;
+
+    fn make_master(plan: &MasterPlan, place: usize) -> Result<Scanner, StartError> {
+        Ok(scanner::scanner(plan, place))
+    }
+
+    fn open(uri: &BusUri, rate: BitRate) -> Result<Box<dyn CanPort>, LinkError> {
+        codewheel_link::open(uri, rate)
+    }
+
+    fn describe(port: &Box<dyn CanPort>) -> String {
+        port.describe()
+    }
+
+    fn waker(port: &Box<dyn CanPort>) -> Waker {
+        port.waker()
+    }
+
+    fn drive(clock: Clock) -> Loop {
+        Loop::new(clock)
+    }
+}
+
+impl Switches for codewheel_device::Switches {
+    fn position(&self) -> u8 {
+        Self::address(self)
+    }
+
+    fn address(&self) -> Option<u8> {
+        self.mac().map(codewheel_devicenet::MacId::value)
+    }
+
+    fn termination(&self) -> bool {
+        self.termination
+    }
+}
+
+impl Powered<DeviceNet> for Troubled<DeviceNetEncoder<PlantSensor>> {
+    fn power_up(
+        now: Instant,
+        outfit: &Outfit<DeviceNet>,
+        memory: &Start,
+        sensor: PlantSensor,
+        seed: u64,
+    ) -> Self {
+        let Outfit { product, switches, serial, .. } = outfit;
+        let factory = Factory::with_serial(*serial);
+        let encoder = DeviceNetEncoder::power_up(now, product, factory, *switches, memory, sensor);
+        Self::new(encoder, seed)
+    }
+
+    fn sensor_mut(&mut self) -> &mut PlantSensor {
+        self.station_mut().sensor_mut()
+    }
+
+    fn take_event(&mut self) -> Option<(Instant, Event)> {
+        self.station_mut().take_event()
+    }
+
+    fn keep(&mut self, now: Instant) -> Option<Kept> {
+        self.station_mut().keep(now)
+    }
+
+    fn kept(&mut self, now: Instant, result: Result<(), &MemoryError>) {
+        self.station_mut().kept(now, result);
+    }
+
+    fn snapshot(&self, now: Instant) -> Snapshot {
+        self.station().snapshot(now)
+    }
+
+    fn drops(&self) -> Option<Drops> {
+        Self::drops(self)
+    }
+
+    fn set_drops(&mut self, drops: Option<Drops>) {
+        Self::set_drops(self, drops);
+    }
+
+    fn set_delay(&mut self, delay: Duration) {
+        Self::set_delay(self, delay);
+    }
+}
+
+/// The frames a station wants to see.
+fn filters(station: &Member<DeviceNet>) -> Vec<Filter> {
+    match station {
+        Member::Device(device) => {
+            device.powered().map(|encoder| encoder.station().filter()).into_iter().collect()
+        }
+        Member::Master(scanner) => scanner.filters().to_vec(),
+    }
+}
+
+impl Line<DeviceNet> for Wire<Member<DeviceNet>> {
+    type Id = NodeId;
+    type Event = can::Event;
+    type Statistics = Statistics;
+
+    fn new(plan: &BusPlan<DeviceNet>, seed: u64) -> Self {
+        let mut wire = Self::new(plan.bit_rate, seed);
+        wire.set_faults(plan.faults);
+        wire
+    }
+
+    fn attach(&mut self, name: String, station: Member<DeviceNet>, terminated: bool) -> NodeId {
+        let filters = filters(&station);
+        Self::attach(self, name, station, &filters, terminated)
+    }
+
+    fn detach(&mut self, id: NodeId) -> Option<Member<DeviceNet>> {
+        Self::detach(self, id)
+    }
+
+    fn node(&self, id: NodeId) -> Option<&Member<DeviceNet>> {
+        Self::node(self, id)
+    }
+
+    fn node_mut(&mut self, id: NodeId) -> Option<&mut Member<DeviceNet>> {
+        Self::node_mut(self, id)
+    }
+
+    fn bus_off(&mut self, id: NodeId) {
+        Self::bus_off(self, id, &mut |_| {});
+    }
+
+    fn set_corruption_at(&mut self, id: NodeId, probability: Option<f64>) {
+        Self::set_corruption_at(self, id, probability);
+    }
+
+    fn run_until(&mut self, until: Instant, observer: &mut impl FnMut(&can::Event)) {
+        Self::run_until(self, until, observer);
+    }
+
+    fn now(&self) -> Instant {
+        Self::now(self)
+    }
+
+    fn statistics(&self) -> Statistics {
+        Self::statistics(self)
+    }
+
+    fn load(newer: &Statistics, older: &Statistics) -> f64 {
+        newer.bus_load_since(older)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        Self::warnings(self)
+    }
+}
+
+/// How many bits a controller stays off the bus, at least: 128 times 11.
+const BUS_OFF_BITS: u64 = 128 * 11;
+
+/// Stations that share a CAN port.
+#[derive(Debug)]
+pub struct Stations {
+    composite: Composite<Member<DeviceNet>>,
+    bus_off_time: Duration,
+}
+
+impl Shared<DeviceNet> for Stations {
+    fn new(rate: BitRate) -> Self {
+        let bus_off_time = Duration::from_nanos(BUS_OFF_BITS * rate.bit_nanos());
+        Self { composite: Composite::new(), bus_off_time }
+    }
+
+    fn turn(
+        &mut self,
+        drive: &mut Loop,
+        port: &mut Box<dyn CanPort>,
+        until: Option<Instant>,
+    ) -> Result<Vec<Notice>, LinkError> {
+        Ok(drive.turn(&mut self.composite, &mut **port, until)?.notices)
+    }
+}
+
+impl Medium<DeviceNet> for Stations {
+    fn plug_in(&mut self, place: usize, station: Member<DeviceNet>) {
+        self.composite.put(place, station);
+    }
+
+    fn unplug(&mut self, place: usize) -> Option<Member<DeviceNet>> {
+        self.composite.take(place)
+    }
+
+    fn station(&self, place: usize) -> Option<&Member<DeviceNet>> {
+        self.composite.station(place)
+    }
+
+    fn station_mut(&mut self, place: usize) -> Option<&mut Member<DeviceNet>> {
+        self.composite.station_mut(place)
+    }
+
+    fn bus_off(&mut self, place: usize, now: Instant) {
+        self.composite.bus_off(place, now, now + self.bus_off_time);
+    }
+
+    fn set_corruption(&mut self, _: usize, _: Option<f64>) {
+        // A plan has this for virtual buses only.
+    }
+}
