@@ -27,7 +27,7 @@ explain() {
     bench-builds) echo "the benchmarks build" ;;
     fuzz-builds) echo "the fuzz targets build (fuzz/); their corpus runs in test" ;;
     deny) echo "licences, sources and bans of every dependency (cargo deny, deny.toml)" ;;
-    strangers) echo "python-can plays the DeviceNet master, tshark judges what it saw (strangers/)" ;;
+    strangers) echo "masters that are not ours, written from the manuals or by others (strangers/)" ;;
     esac
 }
 
@@ -92,25 +92,31 @@ step_strangers() {
         cp strangers/requirements.txt "$venv/requirements.txt"
     fi
     cargo build --package codewheel --locked
-    local python="$venv/bin/python" logs="$CARGO_TARGET_DIR/strangers-logs"
+    local python="$venv/bin/python" logs="$CARGO_TARGET_DIR/strangers-logs" walks=()
     mkdir -p "$logs"
     "$python" strangers/devicenet_master_test.py
+    "$python" strangers/profibus_book_test.py
     "$python" strangers/tshark_judges.py --self-test
     # Walks mostly wait for the encoder's clock, so they go side by side.
-    local session="$logs/session" chapters=("$logs/modes" "$logs/resting" "$logs/objects")
     # Not local, since the trap outlives this function.
     pids=()
     trap '[ ${#pids[@]} = 0 ] || kill "${pids[@]}" 2>/dev/null' EXIT
-    walk "$session" devicenet_session.py
-    walk "${chapters[0]}" devicenet_chapters.py --part turning taken rushing singleturn
-    walk "${chapters[1]}" devicenet_chapters.py --part resting
-    walk "${chapters[2]}" devicenet_chapters.py --part objects
-    local at failed=() walks=("$session" "${chapters[@]}")
+    walk session devicenet_session.py
+    walk modes devicenet_chapters.py --part turning taken rushing singleturn
+    walk resting devicenet_chapters.py --part resting
+    walk objects devicenet_chapters.py --part objects
+    walk profibus-session profibus_session.py
+    walk profibus-telegrams profibus_chapters.py --part telegrams rates lamp segment
+    walk profibus-services profibus_chapters.py --part services watchdog
+    walk profibus-settings profibus_chapters.py --part parameters data
+    walk profibus-diagnosis profibus_chapters.py --part diagnosis
+    walk pyprofibus pyprofibus_session.py
+    local at failed=()
     for at in "${!pids[@]}"; do
         if wait "${pids[at]}"; then
-            cat "${walks[at]}.out"
+            cat "$logs/${walks[at]}.out"
         else
-            failed+=("${walks[at]}.out")
+            failed+=("$logs/${walks[at]}.out")
         fi
     done
     pids=()
@@ -119,16 +125,17 @@ step_strangers() {
         cat "${failed[@]}"
         return 1
     fi
-    "$python" strangers/tshark_judges.py session "$session.log"
-    "$python" strangers/tshark_judges.py chapters "${chapters[@]/%/.log}"
+    "$python" strangers/tshark_judges.py session "$logs/session.log"
+    "$python" strangers/tshark_judges.py chapters "$logs"/{modes,resting,objects}.log
 }
 
-# Starts the walk $2… of `step_strangers`, which writes $1.log and $1.out.
+# Starts the walk $2… of `step_strangers`, called $1, which writes $logs/$1.log and $logs/$1.out.
 walk() {
-    local to=$1 script=$2
+    local name=$1 script=$2
     shift 2
-    "$python" "strangers/$script" "$CARGO_TARGET_DIR/debug/codewheel" --log "$to.log" "$@" \
-        >"$to.out" 2>&1 &
+    "$python" "strangers/$script" "$CARGO_TARGET_DIR/debug/codewheel" --log "$logs/$name.log" "$@" \
+        >"$logs/$name.out" 2>&1 &
+    walks+=("$name")
     pids+=($!)
 }
 

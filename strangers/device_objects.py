@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import devicenet_master as book
+from steps import Wrong, expect, position_at
 from walkthrough import (
     ACKNOWLEDGE_HANDLER,
     ASSEMBLY,
@@ -34,10 +35,7 @@ from walkthrough import (
     TOTAL,
     TURNS,
     Walk,
-    Wrong,
-    expect,
     expect_refusal,
-    position_at,
     signed,
     udint,
     uint,

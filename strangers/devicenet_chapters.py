@@ -35,9 +35,9 @@ from pathlib import Path
 from typing import TextIO
 
 import devicenet_master as book
-import walkthrough
 from device_objects import STILL_AT, DeviceObjects
 from operating_modes import OperatingModes
+from steps import Ended, Wrong, arguments_of, expect, expect_within
 from walkthrough import (
     ADDRESS,
     ASSEMBLY,
@@ -60,10 +60,7 @@ from walkthrough import (
     VENDOR,
     Program,
     Walk,
-    Wrong,
-    expect,
     expect_refusal,
-    expect_within,
     udint,
     uint,
     unsigned,
@@ -485,7 +482,7 @@ def walk(
             continue
         try:
             run()
-        except walkthrough.Ended:
+        except Ended:
             # The failed step was counted; the other runs do not need this one.
             pass
         finally:
@@ -498,7 +495,7 @@ def main() -> int:
     """Walks; 0 where every step passed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--part", nargs="+", choices=PARTS, default=PARTS, help="some of it only")
-    arguments = walkthrough.arguments_of(parser, "codewheel-devicenet-chapters.log")
+    arguments = arguments_of(parser, "codewheel-devicenet-chapters.log", "candump -L lines")
     begin = time.monotonic()
     with tempfile.TemporaryDirectory() as directory, arguments.log.open("w") as log:
         messages_path = Path(directory) / "messages"

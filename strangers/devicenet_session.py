@@ -22,7 +22,7 @@ from functools import partial
 from pathlib import Path
 
 import devicenet_master as book
-import walkthrough
+from steps import Wrong, arguments_of, expect, expect_within, position_at
 from walkthrough import (
     ADDRESS,
     CONFIGURING,
@@ -51,11 +51,7 @@ from walkthrough import (
     VENDOR,
     Program,
     Walk,
-    Wrong,
-    expect,
     expect_refusal,
-    expect_within,
-    position_at,
     udint,
     unsigned,
 )
@@ -473,7 +469,7 @@ class Session(Walk):
 def main() -> int:
     """Runs the session; 0 where every step passed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments = walkthrough.arguments_of(parser, "codewheel-devicenet-session.log")
+    arguments = arguments_of(parser, "codewheel-devicenet-session.log", "candump -L lines")
     with tempfile.TemporaryDirectory() as directory, arguments.log.open("w") as log:
         messages_path = Path(directory) / "messages"
         with messages_path.open("w") as messages:

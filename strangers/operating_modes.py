@@ -10,6 +10,7 @@ from functools import partial
 
 import devicenet_master as book
 from devicenet_master import Frame
+from steps import Wrong, expect, expect_within
 from walkthrough import (
     ACKNOWLEDGE_HANDLER,
     CONFIGURING,
@@ -31,10 +32,7 @@ from walkthrough import (
     TIMED_OUT,
     TOTAL,
     Walk,
-    Wrong,
-    expect,
     expect_refusal,
-    expect_within,
     uint,
     unsigned,
 )

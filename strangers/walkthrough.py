@@ -1,18 +1,12 @@
-"""What all walks through an encoder share: the program as a process, steps with a line each.
+"""What all walks through a DeviceNet encoder share: the program on its bus, what steps often do.
 
 No script to run: `devicenet_session.py` and `devicenet_chapters.py` build on it.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
-import selectors
-import signal
 import socket
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,7 +15,8 @@ from typing import TextIO
 import can
 
 import devicenet_master as book
-from devicenet_master import BookViolation, Master, Refused, Silence, Wire
+from devicenet_master import BookViolation, Frame, Master, Refused, Silence, Wire
+from steps import Process, Steps, Wrong, expect, shown
 
 ADDRESS = 5
 OUR_MAC = 0x3F
@@ -44,34 +39,8 @@ EXPLICIT_CONNECTION, POLL_CONNECTION, COS_CONNECTION = 1, 2, 4
 STATE, PRODUCED_SIZE, EXPECTED_PACKET_RATE, PRODUCED_PATH, INHIBIT_TIME = 1, 7, 9, 14, 17
 CONFIGURING, ESTABLISHED, TIMED_OUT = 1, 3, 4
 
-# How much of a conversation is printed with a failure; all of it is in the log.
-SHOWN_FRAMES = 40
-READY_SECONDS = 10.0
 # The check itself takes 2 s from the start; a little more for a busy machine.
 ON_LINE_SECONDS = 2.5
-
-
-class Wrong(Exception):
-    """Something else was seen than what the book asks for."""
-
-
-def expect(what: str, seen: object, wanted: object) -> None:
-    """Raises `Wrong` with both values where they differ."""
-    if seen != wanted:
-        raise Wrong(f"{what}: expected {shown(wanted)}, got {shown(seen)}")
-
-
-def shown(value: object) -> str:
-    """A value for people: octets in hexadecimal."""
-    if isinstance(value, bytes):
-        return f"[{value.hex(' ')}]"
-    return repr(value)
-
-
-def expect_within(what: str, seen: float, low: float, high: float) -> None:
-    """Raises `Wrong` where `seen` is outside low … high."""
-    if not low <= seen <= high:
-        raise Wrong(f"{what}: expected {low:g} … {high:g}, got {seen:g}")
 
 
 def expect_refusal(action: Callable[[], object], status: int, additional: int | None = None) -> str:
@@ -108,95 +77,25 @@ def udint(value: int) -> bytes:
     return value.to_bytes(4, "little")
 
 
-def unwrapped(raw: int, steps: int, clockwise: bool) -> int:
-    """The scaled position before range and offset: ⌊r·n/S⌋ clockwise, −⌈r·n/S⌉ the other way."""
-    return raw * steps // STEPS if clockwise else -raw * steps // STEPS
-
-
-def position_at(raw: int, steps: int, total: int, offset: int = 0, clockwise: bool = True) -> int:
-    """The position of a shaft that stands at `raw`, in the first run of the raw code."""
-    return (unwrapped(raw, steps, clockwise) % total + offset) % total
-
-
-class Ended(SystemExit):
-    """A vital step failed, so the run has no sense any more."""
-
-
-class Program:
-    """The program under test, as a process."""
+class Program(Process):
+    """The program under test, as an encoder behind an SLCAN adapter on TCP."""
 
     def __init__(self, path: Path, model: str, memory: Path, messages: TextIO) -> None:
-        self._path = path
+        super().__init__(path, messages)
         self.model = model
         self._memory = memory
-        self._messages = messages
-        self._process: subprocess.Popen[str] | None = None
         self.port = 0
 
     def start(self, shaft: str, address: int = ADDRESS, baud: str | None = None) -> str:
         """Starts it and waits until it says that it is ready; returns that line."""
         self.port = free_port()
         bus = f"slcan-listen:127.0.0.1:{self.port}"
-        command = [str(self._path), "encoder", self.model, "--bus", bus]
-        command += ["--address", str(address), "--shaft", shaft]
-        command += ["--memory", str(self._memory), "--serial", str(SERIAL)]
+        command = ["encoder", self.model, "--bus", bus, "--address", str(address)]
+        command += ["--shaft", shaft, "--memory", str(self._memory), "--serial", str(SERIAL)]
         command += ["--baud", baud] if baud else []
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=self._messages,
-            text=True,
-        )
-        line = self._first_line()
+        line = self.launch(command)
         expect("the first line on stdout", line, f"ready {self.model} address {address} on {bus}")
         return line
-
-    def _first_line(self) -> str:
-        assert self._process is not None and self._process.stdout is not None
-        with selectors.DefaultSelector() as selector:
-            selector.register(self._process.stdout, selectors.EVENT_READ)
-            if not selector.select(READY_SECONDS):
-                raise Wrong(f"the program said nothing on stdout for {READY_SECONDS:g} s")
-        line = self._process.stdout.readline()
-        if not line:
-            status = self._process.wait(5)
-            raise Wrong(f"the program left with exit status {status} before it was ready")
-        return line.rstrip("\n")
-
-    def exit_status(self) -> int | None:
-        """None while it runs or was not started. A program just dying gets a moment for it."""
-        if self._process is None:
-            return None
-        try:
-            return self._process.wait(0.3)
-        except subprocess.TimeoutExpired:
-            return None
-
-    def terminate(self) -> str:
-        """Asks it to leave, which it must do with exit status 0 within 5 s."""
-        assert self._process is not None
-        if (status := self._process.poll()) is not None:
-            raise Wrong(f"the program left by itself with exit status {status}")
-        begin = time.monotonic()
-        self._process.send_signal(signal.SIGTERM)
-        try:
-            status = self._process.wait(5)
-        except subprocess.TimeoutExpired:
-            raise Wrong("the program still runs 5 s after SIGTERM") from None
-        expect("exit status after SIGTERM", status, 0)
-        self.end()
-        return f"exit status 0 after {time.monotonic() - begin:.2f} s"
-
-    def end(self) -> None:
-        """Leaves no process behind, whatever happened."""
-        if self._process is not None:
-            if self._process.poll() is None:
-                self._process.kill()
-            self._process.wait()
-            if self._process.stdout is not None:
-                self._process.stdout.close()
-            self._process = None
 
 
 def free_port() -> int:
@@ -206,43 +105,23 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-class Walk:
-    """Steps through what a running program should do; each prints one line."""
+class Walk(Steps):
+    """Steps through what a running DeviceNet encoder should do; each prints one line."""
+
+    wrongs = (*Steps.wrongs, BookViolation, Refused, Silence, can.CanError)
 
     def __init__(self, program: Program, log: TextIO) -> None:
+        super().__init__(program)
         self._program = program
         self._log = log
         self._bus: can.BusABC | None = None
-        self.passed = 0
-        self.failed = 0
         self.heard: set[int] = set()
 
+    def conversation(self) -> list[Frame]:
+        """The frames of this run."""
+        return [] if self._bus is None else self.wire.seen
+
     # --- The frame around the steps
-
-    def step(self, name: str, action: Callable[[], str], vital: bool = False) -> None:
-        """Runs a step and prints its line. A vital step that fails ends the session."""
-        begin = 0 if self._bus is None else len(self.wire.seen)
-        try:
-            seen = action()
-        except (Wrong, BookViolation, Refused, Silence, can.CanError, OSError) as error:
-            self.failed += 1
-            died = self._program.exit_status()
-            reason = "" if died is None else f" (the program has left with exit status {died})"
-            print(f"FAILED {name}: {error}{reason}", flush=True)
-            self.show_conversation(begin)
-            if vital or died is not None:
-                raise Ended(1) from None
-            return
-        self.passed += 1
-        print(f"ok     {name}: {seen}", flush=True)
-
-    def show_conversation(self, begin: int) -> None:
-        """The last frames of a step, from frame `begin` on, with milliseconds before the last."""
-        frames = [] if self._bus is None else self.wire.seen[begin:][-SHOWN_FRAMES:]
-        for frame in frames:
-            whose = "master " if frame.is_ours else "encoder"
-            before = 1000 * (frame.at - frames[-1].at)
-            print(f"       {whose} {before:8.1f} ms  {frame}", flush=True)
 
     def start(self, shaft: str, address: int = ADDRESS, baud: str | None = None) -> str:
         """Starts the program and joins its bus."""
@@ -386,10 +265,6 @@ class Walk:
         self.named(self.answers_nothing_before_it_is_on_line)
         self.named(self.checks_its_mac_id_at_the_start)
 
-    def named(self, action: Callable[[], str], vital: bool = False) -> None:
-        """A step that is called like its method."""
-        self.step(action.__name__.replace("_", " "), action, vital)
-
     def connected(self, action: Callable[[], str]) -> None:
         """The same, with an explicit connection of its own."""
 
@@ -398,23 +273,3 @@ class Walk:
                 return action()
 
         self.step(action.__name__.replace("_", " "), inside)
-
-
-def default_program() -> Path:
-    """The release build where there is one, else the debug build."""
-    target = Path(__file__).resolve().parent.parent / "target"
-    release = target / "release" / "codewheel"
-    return release if release.exists() else target / "debug" / "codewheel"
-
-
-def arguments_of(parser: argparse.ArgumentParser, log: str) -> argparse.Namespace:
-    """What every walk is told: the program, and the file for the frames."""
-    parser.add_argument("program", nargs="?", type=Path, default=default_program())
-    path = Path(tempfile.gettempdir()) / log
-    parser.add_argument("--log", type=Path, default=path, help="candump -L lines")
-    arguments = parser.parse_args()
-    # So that the program is ended, too.
-    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
-    if not arguments.program.is_file():
-        parser.error(f"no program at {arguments.program}; build it with 'cargo build' first")
-    return arguments
