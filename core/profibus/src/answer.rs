@@ -40,45 +40,55 @@ impl<const N: usize> Machine<N> {
         owed: Owed,
         buffer: &mut [u8; TRANSMISSION_OCTETS],
         app: &mut A,
-    ) -> Option<usize> {
+    ) -> Option<u8> {
+        if owed.answer != Answer::DataExchange {
+            return self.build_other(now, station, owed, buffer, app);
+        }
+        let head = |reply| bare(station, owed.master, reply);
+        let octets = self.data.inputs(now, head(Reply::DataLow).room(buffer), app);
+        // Asked after the inputs: to look at them may show a fault.
+        let pending = self.is_diagnosis_pending(app);
+        if octets == 0 && !pending {
+            return acknowledge(buffer);
+        }
+        head(if pending { Reply::DataHigh } else { Reply::DataLow }).close(buffer, octets)
+    }
+
+    /// Anything but Data_Exchange, which is not to save registers for it.
+    #[inline(never)]
+    fn build_other<A: Application>(
+        &mut self,
+        now: Instant,
+        station: u8,
+        owed: Owed,
+        buffer: &mut [u8; TRANSMISSION_OCTETS],
+        app: &mut A,
+    ) -> Option<u8> {
         let Owed { answer, master, saps } = owed;
-        let bare = |reply| {
-            let function_code = FunctionCode::reply(reply);
-            Head { destination: master, source: station, function_code, saps: None }
-        };
-        let data = Head { saps, ..bare(Reply::DataLow) };
-        let (head, octets) = match answer {
-            Answer::DataExchange => {
-                let octets = self.data.inputs(now, bare(Reply::DataLow).room(buffer), app);
-                // Asked after the inputs: to look at them may show a fault.
-                let pending = self.is_diagnosis_pending(app);
-                if octets == 0 && !pending {
-                    return acknowledge(buffer);
-                }
-                (bare(if pending { Reply::DataHigh } else { Reply::DataLow }), octets)
-            }
+        let data = Head { saps, ..bare(station, master, Reply::DataLow) };
+        let octets = match answer {
             Answer::ShortAcknowledge => return acknowledge(buffer),
-            Answer::Bare(reply) => (bare(reply), 0),
+            Answer::Bare(reply) => return bare(station, master, reply).close(buffer, 0),
             Answer::Diagnosis => {
                 let octets = self.diagnosis(now, data.room(buffer), app)?;
                 if self.master == Some(master) {
                     self.diagnosis_read = Some(app.diagnosis_version());
                 }
-                (data, octets)
+                octets
             }
             Answer::Configuration => {
                 let mut out = Writer::new(data.room(buffer));
                 app.configuration(&mut out);
-                (data, out.len())
+                out.len()
             }
-            Answer::Inputs => (data, self.data.inputs(now, data.room(buffer), app)),
+            Answer::DataExchange | Answer::Inputs => self.data.inputs(now, data.room(buffer), app),
             Answer::Outputs => {
                 let outputs = self.data.outputs();
                 data.room(buffer).get_mut(..outputs.len())?.copy_from_slice(outputs);
-                (data, outputs.len())
+                outputs.len()
             }
         };
-        head.close(buffer, octets)
+        data.close(buffer, octets)
     }
 
     /// Whether the owner must read the diagnosis.
@@ -133,7 +143,13 @@ const fn bit(set: bool, bit: u8) -> u8 {
     if set { bit } else { 0 }
 }
 
-fn acknowledge(buffer: &mut [u8; TRANSMISSION_OCTETS]) -> Option<usize> {
+/// An answer without service access points.
+const fn bare(station: u8, master: u8, reply: Reply) -> Head {
+    let function_code = FunctionCode::reply(reply);
+    Head { destination: master, source: station, function_code, saps: None }
+}
+
+fn acknowledge(buffer: &mut [u8; TRANSMISSION_OCTETS]) -> Option<u8> {
     *buffer.first_mut()? = SC;
     Some(1)
 }

@@ -35,19 +35,24 @@ pub(crate) enum Change {
 pub(crate) struct BaudSearch {
     stage: Stage,
     rate: BaudRate,
+    /// How long the rate, once found, outlasts its last telegram.
+    patience: Duration,
     /// When this dwell, or all patience, ends; the origin of time before the first call.
     until: Deadline,
 }
 
 impl BaudSearch {
-    pub(crate) const fn new(baud: Baud) -> Self {
+    pub(crate) fn new(baud: Baud) -> Self {
         match baud {
             Baud::Search => Self {
                 stage: Stage::NotBegun,
                 rate: BaudRate::Mbit12,
+                patience: patience(BaudRate::Mbit12),
                 until: Deadline::at(Instant::ZERO),
             },
-            Baud::Fixed(rate) => Self { stage: Stage::Given, rate, until: Deadline::NEVER },
+            Baud::Fixed(rate) => {
+                Self { stage: Stage::Given, rate, patience: patience(rate), until: Deadline::NEVER }
+            }
         }
     }
 
@@ -66,8 +71,12 @@ impl BaudSearch {
         if self.stage == Stage::Given {
             return false;
         }
-        self.until = Deadline::at(now + dwell(self.rate).times(PATIENCE));
-        core::mem::replace(&mut self.stage, Stage::Found) != Stage::Found
+        self.until = Deadline::at(now + self.patience);
+        let found = !self.is_settled();
+        if found {
+            self.stage = Stage::Found;
+        }
+        found
     }
 
     #[inline]
@@ -83,6 +92,7 @@ impl BaudSearch {
             Stage::Found => (BaudRate::Mbit12, Some(Change::Lost)),
         };
         self.rate = rate;
+        self.patience = patience(rate);
         self.stage = Stage::Trying;
         self.until = Deadline::at(now + dwell(rate));
         change
@@ -96,6 +106,10 @@ impl BaudSearch {
 
 fn dwell(rate: BaudRate) -> Duration {
     Duration::from_millis(50) + rate.bits(3_000)
+}
+
+fn patience(rate: BaudRate) -> Duration {
+    dwell(rate).times(PATIENCE)
 }
 
 /// The rate below; below the lowest comes the highest.

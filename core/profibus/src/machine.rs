@@ -52,6 +52,8 @@ impl<const N: usize> Machine<N> {
     }
 
     /// Executes a request to a service access point and says what is to be answered.
+    // Apart, as all that is rare: Data_Exchange is not to save registers for it.
+    #[inline(never)]
     pub(crate) fn serve<A: Application>(
         &mut self,
         now: Instant,
@@ -218,6 +220,7 @@ impl<const N: usize> Machine<N> {
 
     /// Global_Control: `octets` are the commands and the groups they are for; with no group they
     /// are for all.
+    #[inline(never)]
     pub(crate) fn global_control<A: Application>(
         &mut self,
         now: Instant,
@@ -252,6 +255,7 @@ impl<const N: usize> Machine<N> {
     }
 
     /// Back to WAIT_PRM: nobody's slave, outputs 0.
+    #[inline(never)]
     fn leave<A: Application>(&mut self, now: Instant, loss: Loss, app: &mut A) {
         self.state = State::WaitPrm;
         self.master = None;

@@ -68,19 +68,17 @@ impl<const N: usize> ProcessData<N> {
             return;
         }
         self.received = true;
-        let room = if self.sync { &mut self.held } else { &mut self.outputs };
-        if let Ok(all) = <[u8; N]>::try_from(octets) {
-            *room = all;
-        } else if let Some(room) = room.get_mut(..octets.len()) {
-            room.copy_from_slice(octets);
-        }
-        if !self.sync {
+        if self.sync {
+            store(&mut self.held, octets);
+        } else {
+            store(&mut self.outputs, octets);
             app.outputs(now, octets);
         }
     }
 
     /// Global_Control for a group of this slave. Whether Sync and Freeze may be commanded was
-    /// settled by Set_Prm. The order is Clear, then Unsync and Unfreeze, then Sync and Freeze.
+    /// settled by Set_Prm. Clear comes first. Unsync and Unfreeze win over Sync and Freeze in the
+    /// same telegram, which are then not looked at (EN 50170-2: both bits set switch it off).
     pub(crate) fn control<A: Application>(
         &mut self,
         now: Instant,
@@ -93,14 +91,12 @@ impl<const N: usize> ProcessData<N> {
         if has(command::CLEAR) {
             self.clear(now, app);
         }
-        if has(command::UNSYNC) && self.sync {
-            self.transfer(now, app);
-            self.sync = false;
-        }
-        if has(command::UNFREEZE) {
-            self.freeze = false;
-        }
-        if has(command::SYNC) && may_sync {
+        if has(command::UNSYNC) {
+            if self.sync {
+                self.transfer(now, app);
+                self.sync = false;
+            }
+        } else if has(command::SYNC) && may_sync {
             // Before the first Sync outputs were transferred as they came.
             if self.sync {
                 self.transfer(now, app);
@@ -109,7 +105,9 @@ impl<const N: usize> ProcessData<N> {
                 self.sync = true;
             }
         }
-        if has(command::FREEZE) && may_freeze {
+        if has(command::UNFREEZE) {
+            self.freeze = false;
+        } else if has(command::FREEZE) && may_freeze {
             self.freeze = false;
             let mut latched = [0; N];
             if let Some(room) = latched.get_mut(..usize::from(self.lengths.inputs)) {
@@ -151,10 +149,21 @@ impl<const N: usize> ProcessData<N> {
     ) -> usize {
         let length = usize::from(self.lengths.inputs);
         let Some(room) = room.get_mut(..length) else { return 0 };
-        match self.frozen.get(..length) {
-            Some(latched) if self.freeze => room.copy_from_slice(latched),
-            _ => app.inputs(now, room),
+        if !self.freeze {
+            app.inputs(now, room);
+        } else if let Some(latched) = self.frozen.get(..length) {
+            room.copy_from_slice(latched);
         }
         length
+    }
+}
+
+/// Most configurations fill the room, and a known length needs no call.
+#[inline]
+fn store<const N: usize>(room: &mut [u8; N], octets: &[u8]) {
+    if let Ok(all) = octets.try_into() {
+        *room = all;
+    } else if let Some(room) = room.get_mut(..octets.len()) {
+        room.copy_from_slice(octets);
     }
 }

@@ -1,6 +1,6 @@
 //! From octets and pauses to telegrams.
 
-use codewheel_station::rs485::{BaudRate, TRANSMISSION_OCTETS};
+use codewheel_station::rs485::{BaudRate, CHARACTER_BITS, TRANSMISSION_OCTETS};
 use codewheel_station::{Duration, Instant};
 
 use crate::Timing;
@@ -11,6 +11,9 @@ use crate::telegram::{Telegram, length_of};
 const ABANDONED_AFTER: Duration = Duration::from_millis(50);
 /// Such a port takes a pause this long for an idle line, or 33 bits where they last longer.
 const QUIET: Duration = Duration::from_millis(1);
+
+/// The half bits of a character.
+const CHARACTER_HALF_BITS: u64 = 2 * CHARACTER_BITS as u64;
 
 /// What octets turned out to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,6 +88,7 @@ impl Receiver {
     }
 
     /// Bits are counted to the nearest half: a UART does no better, and spans of time are rounded.
+    #[inline]
     fn arrive_exactly(
         &mut self,
         now: Instant,
@@ -92,10 +96,10 @@ impl Receiver {
         rate: BaudRate,
         last: Instant,
     ) -> bool {
-        let count = u32::try_from(count).unwrap_or(u32::MAX);
-        let pause = (now - rate.characters(count)).since(last).times(2);
-        let idle = pause >= rate.bits(65);
-        let abandoned = self.filled > 0 && pause >= rate.bits(1);
+        let span = now.since(last);
+        let octets = u64::from(u32::try_from(count).unwrap_or(u32::MAX)) * CHARACTER_HALF_BITS;
+        let idle = lasts(span, octets + 65, rate);
+        let abandoned = self.filled > 0 && lasts(span, octets + 1, rate);
         if abandoned {
             self.filled = 0;
             self.dropping = true;
@@ -109,15 +113,14 @@ impl Receiver {
         abandoned
     }
 
-    /// The telegram that lies whole at the beginning of `octets`, and what lies behind it; `None`
-    /// where these octets are to be [taken](Self::take) one by one. Nothing is copied.
+    /// The telegram that lies whole at the beginning of `octets`; `None` where they are to be
+    /// [taken](Self::take) one by one. Nothing is copied.
     #[inline]
-    pub(crate) fn whole<'a>(&self, octets: &'a [u8]) -> Option<(Telegram<'a>, &'a [u8])> {
+    pub(crate) fn whole<'a>(&self, octets: &'a [u8]) -> Option<Telegram<'a>> {
         if self.dropping || self.filled > 0 {
             return None;
         }
-        let telegram = Telegram::decode(octets).ok().flatten()?;
-        Some((telegram, octets.get(telegram.length()..)?))
+        Telegram::decode(octets).ok().flatten()
     }
 
     /// Takes octets that [`arrive`](Self::arrive) announced, up to the end of the first telegram,
@@ -175,9 +178,30 @@ impl Receiver {
     }
 }
 
+/// Whether `span` lasts `half_bits` half bits at `rate`. Nothing is divided: as many times as a
+/// second has half bits, a half bit is a second.
+#[inline]
+fn lasts(span: Duration, half_bits: u64, rate: BaudRate) -> bool {
+    let half_bits_per_second = 2 * u64::from(rate.bits_per_second());
+    span.times(half_bits_per_second) >= Duration::from_secs(half_bits)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn half_bits_are_exact_at_every_rate() {
+        for rate in BaudRate::ALL {
+            for bits in [1, 33, 11 * 255 + 33] {
+                let span = rate.bits(bits);
+                assert!(lasts(span, 2 * u64::from(bits), rate), "{bits} bits at {rate}");
+                let shorter = Duration::from_nanos(span.as_nanos() - 1);
+                assert!(!lasts(shorter, 2 * u64::from(bits), rate), "{bits} bits at {rate}");
+            }
+        }
+        assert!(lasts(Duration::from_nanos(u64::MAX), 1, BaudRate::Mbit12));
+    }
 
     #[test]
     fn fifty_milliseconds_are_longer_than_thirty_three_bits_at_every_rate() {

@@ -6,7 +6,7 @@
 //! the bit would answer with the same stale data for ever. So only a request that is the last one
 //! octet for octet is a retry (decision).
 
-use codewheel_station::rs485::{BaudRate, TRANSMISSION_OCTETS, Transmission};
+use codewheel_station::rs485::{BaudRate, Transmission};
 use codewheel_station::{Deadline, Duration, Instant};
 
 use crate::function_code::{FunctionCode, Reply};
@@ -53,14 +53,12 @@ pub(crate) struct Responder {
     /// From when on the answer is to be sent; never where none is owed.
     due: Deadline,
     owed: Owed,
-    /// How many octets of `request` are remembered; 0 for none.
-    requested: u8,
     /// FC of the request remembered: most new requests differ in it.
     code: FunctionCode,
-    /// How many octets of `answer` have been built; 0 where it was not yet fetched.
-    built: u8,
-    request: [u8; TRANSMISSION_OCTETS],
-    pub(crate) answer: [u8; TRANSMISSION_OCTETS],
+    /// The request remembered; empty for none.
+    request: Transmission,
+    /// The answer; empty where it was not yet fetched.
+    pub(crate) answer: Transmission,
 }
 
 impl Responder {
@@ -70,11 +68,9 @@ impl Responder {
             delay: rate.bits(u32::from(SHORTEST_STATION_DELAY)),
             due: Deadline::NEVER,
             owed: Owed { answer: Answer::ShortAcknowledge, master: 0, saps: None },
-            requested: 0,
             code: FunctionCode(0),
-            built: 0,
-            request: [0; TRANSMISSION_OCTETS],
-            answer: [0; TRANSMISSION_OCTETS],
+            request: Transmission::EMPTY,
+            answer: Transmission::EMPTY,
         }
     }
 
@@ -98,26 +94,20 @@ impl Responder {
     /// Whether the request is the one remembered, octet for octet.
     #[inline]
     pub(crate) fn is_retry(&self, code: FunctionCode, octets: &[u8]) -> bool {
-        code == self.code && self.request.get(..usize::from(self.requested)) == Some(octets)
+        code == self.code && self.request.octets() == octets
     }
 
     /// Remembers a request that was executed.
     #[inline]
     pub(crate) fn remember(&mut self, code: FunctionCode, octets: &[u8]) {
         self.code = code;
-        self.requested = 0;
-        if let (Some(room), Ok(length)) =
-            (self.request.get_mut(..octets.len()), u8::try_from(octets.len()))
-        {
-            room.copy_from_slice(octets);
-            self.requested = length;
-        }
+        self.request.set(octets);
     }
 
     /// No request that comes is a retry.
     #[inline]
     pub(crate) fn forget(&mut self) {
-        self.requested = 0;
+        self.request.set_length(0);
     }
 
     /// Nothing is owed any more. What the answer would have said is built anew for a retry, where
@@ -132,7 +122,7 @@ impl Responder {
     pub(crate) fn owe(&mut self, owed: Owed, due: Deadline) {
         self.owed = owed;
         self.due = due;
-        self.built = 0;
+        self.answer.set_length(0);
     }
 
     /// The same answer is owed again, as it was built, where it was.
@@ -149,22 +139,5 @@ impl Responder {
     #[inline]
     pub(crate) fn take_due(&mut self, now: Instant) -> Option<Owed> {
         self.due.take_due(now).then_some(self.owed)
-    }
-
-    pub(crate) const fn is_built(&self) -> bool {
-        self.built > 0
-    }
-
-    /// The first `length` octets of the answer have been built.
-    #[inline]
-    pub(crate) fn set_built(&mut self, length: usize) {
-        self.built = u8::try_from(length).unwrap_or_default();
-    }
-
-    #[inline]
-    pub(crate) fn transmission(&self) -> Option<Transmission> {
-        let octets =
-            self.answer.get(..usize::from(self.built)).filter(|octets| !octets.is_empty())?;
-        Transmission::new(octets)
     }
 }

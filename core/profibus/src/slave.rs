@@ -163,55 +163,72 @@ impl<const N: usize> Slave<N> {
             // Whoever sends now has not waited for the answer.
             self.responder.cancel();
             let copy;
-            let (telegram, octets) = if let Some((telegram, behind)) = self.receiver.whole(rest) {
-                let octets = rest.get(..telegram.length()).unwrap_or(rest);
-                rest = behind;
-                (telegram, octets)
-            } else {
-                let (used, received) = self.receiver.take(rest);
-                rest = rest.get(used..).unwrap_or_default();
-                if received == Received::Broken {
-                    self.count_broken();
+            let (data, octets) = match self.receiver.whole(rest) {
+                Some(Telegram::Data(data)) => {
+                    let octets;
+                    (octets, rest) = rest.split_at_checked(data.length()).unwrap_or_default();
+                    (data, octets)
                 }
-                if received != Received::Telegram {
+                Some(telegram) => {
+                    rest = rest.get(telegram.length()..).unwrap_or_default();
+                    self.without_data(&telegram);
                     continue;
                 }
-                // The receiver goes on with its buffer while the telegram is executed.
-                copy = Transmission::new(self.receiver.pieced());
-                let octets = copy.as_ref().map_or(&[][..], Transmission::octets);
-                let Ok(Some(telegram)) = Telegram::decode(octets) else { continue };
-                (telegram, octets)
+                None => {
+                    (rest, copy) = self.piece(rest);
+                    match Telegram::decode(copy.octets()) {
+                        Ok(Some(Telegram::Data(data))) => (data, copy.octets()),
+                        Ok(Some(telegram)) => {
+                            self.without_data(&telegram);
+                            continue;
+                        }
+                        _ => continue,
+                    }
+                }
             };
-            self.telegram(now, &telegram, octets, app);
+            self.data(now, &data, octets, app);
         }
     }
 
-    /// A telegram that ended at `now`; `octets` are all of it.
+    /// Takes what is no whole telegram: what is left of it, and the telegram that it completes.
+    // Apart, so that its buffer costs a whole telegram nothing.
+    #[inline(never)]
+    fn piece<'a>(&mut self, octets: &'a [u8]) -> (&'a [u8], Transmission) {
+        let (used, received) = self.receiver.take(octets);
+        if received == Received::Broken {
+            self.count_broken();
+        }
+        // The receiver goes on with its buffer while the telegram is executed.
+        let mut copy = Transmission::EMPTY;
+        if received == Received::Telegram {
+            copy.set(self.receiver.pieced());
+        }
+        (octets.get(used..).unwrap_or_default(), copy)
+    }
+
+    /// SD4 or SC.
+    fn without_data(&mut self, telegram: &Telegram<'_>) {
+        count(&mut self.counters.telegrams);
+        self.receiver.end_telegram();
+        if matches!(telegram, Telegram::Token { .. }) {
+            self.responder.forget();
+        }
+    }
+
+    /// SD1, SD2 or SD3 that ended at `now`; `octets` are all of it.
     #[inline]
-    fn telegram<A: Application>(
-        &mut self,
-        now: Instant,
-        telegram: &Telegram<'_>,
-        octets: &[u8],
-        app: &mut A,
-    ) {
+    fn data<A: Application>(&mut self, now: Instant, data: &Data<'_>, octets: &[u8], app: &mut A) {
         count(&mut self.counters.telegrams);
         let after_idle = self.receiver.end_telegram();
-        match telegram {
-            Telegram::Data(data) => {
-                if self.baud.heard(now) {
-                    app.notice(now, Event::BaudRateFound(self.baud.rate()));
-                }
-                if let Some(function) = data.function_code().function() {
-                    if after_idle {
-                        self.request(now, function, data, octets, app);
-                    } else {
-                        count(&mut self.counters.broken);
-                    }
-                }
+        if self.baud.heard(now) {
+            app.notice(now, Event::BaudRateFound(self.baud.rate()));
+        }
+        if let Some(function) = data.function_code().function() {
+            if after_idle {
+                self.request(now, function, data, octets, app);
+            } else {
+                count(&mut self.counters.broken);
             }
-            Telegram::Token { .. } => self.responder.forget(),
-            Telegram::ShortAcknowledge => {}
         }
     }
 
@@ -295,12 +312,13 @@ impl<const N: usize> Slave<N> {
     /// The answer that is owed, from its time on. Inputs and diagnosis are those of this call.
     pub fn transmit<A: Application>(&mut self, now: Instant, app: &mut A) -> Option<Transmission> {
         let owed = self.responder.take_due(now)?;
-        if !self.responder.is_built() {
-            let Self { machine, responder, settings, .. } = self;
-            let length = machine.build(now, settings.address, owed, &mut responder.answer, app)?;
-            responder.set_built(length);
+        let Self { machine, responder, settings, .. } = self;
+        if responder.answer.is_empty() {
+            let room = responder.answer.room();
+            let length = machine.build(now, settings.address, owed, room, app)?;
+            responder.answer.set_length(length);
         }
-        self.responder.transmission()
+        Some(responder.answer)
     }
 
     /// When [`advance`](Self::advance) or [`transmit`](Self::transmit) must be called at the

@@ -35,18 +35,21 @@ pub struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// A reader at the first octet of `octets`.
+    #[inline]
     #[must_use]
     pub const fn new(octets: &'a [u8]) -> Self {
         Self { rest: octets }
     }
 
     /// The octets not yet read.
+    #[inline]
     #[must_use]
     pub const fn rest(&self) -> &'a [u8] {
         self.rest
     }
 
     /// Whether all octets have been read.
+    #[inline]
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.rest.is_empty()
@@ -56,6 +59,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Short`] where fewer are left.
+    #[inline]
     pub fn array<const N: usize>(&mut self) -> Result<[u8; N], Short> {
         let (head, rest) = self.rest.split_first_chunk::<N>().ok_or(Short)?;
         self.rest = rest;
@@ -66,6 +70,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Short`] where fewer are left.
+    #[inline]
     pub fn octets(&mut self, count: usize) -> Result<&'a [u8], Short> {
         let (head, rest) = self.rest.split_at_checked(count).ok_or(Short)?;
         self.rest = rest;
@@ -76,6 +81,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Short`] where none is left.
+    #[inline]
     pub fn u8(&mut self) -> Result<u8, Short> {
         self.array::<1>().map(u8::from_le_bytes)
     }
@@ -84,6 +90,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Short`] where fewer are left.
+    #[inline]
     pub fn u16_le(&mut self) -> Result<u16, Short> {
         self.array().map(u16::from_le_bytes)
     }
@@ -92,6 +99,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Short`] where fewer are left.
+    #[inline]
     pub fn u32_le(&mut self) -> Result<u32, Short> {
         self.array().map(u32::from_le_bytes)
     }
@@ -100,6 +108,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Short`] where fewer are left.
+    #[inline]
     pub fn u64_le(&mut self) -> Result<u64, Short> {
         self.array().map(u64::from_le_bytes)
     }
@@ -108,6 +117,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Short`] where fewer are left.
+    #[inline]
     pub fn u16_be(&mut self) -> Result<u16, Short> {
         self.array().map(u16::from_be_bytes)
     }
@@ -116,6 +126,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`Short`] where fewer are left.
+    #[inline]
     pub fn u32_be(&mut self) -> Result<u32, Short> {
         self.array().map(u32::from_be_bytes)
     }
@@ -130,30 +141,35 @@ pub struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     /// A writer at the first octet of `buffer`.
+    #[inline]
     #[must_use]
     pub const fn new(buffer: &'a mut [u8]) -> Self {
         Self { buffer, length: 0 }
     }
 
     /// How many octets have been written.
+    #[inline]
     #[must_use]
     pub const fn len(&self) -> usize {
         self.length
     }
 
     /// Whether nothing has been written yet.
+    #[inline]
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.length == 0
     }
 
     /// What has been written so far.
+    #[inline]
     #[must_use]
     pub fn written(&self) -> &[u8] {
         self.buffer.get(..self.length).unwrap_or_default()
     }
 
     /// Forgets everything written after the first `length` octets.
+    #[inline]
     pub const fn truncate(&mut self, length: usize) {
         if length < self.length {
             self.length = length;
@@ -164,6 +180,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Full`] where they do not fit.
+    #[inline]
     pub fn octets(&mut self, octets: &[u8]) -> Result<(), Full> {
         let end = self.length.checked_add(octets.len()).ok_or(Full)?;
         self.buffer.get_mut(self.length..end).ok_or(Full)?.copy_from_slice(octets);
@@ -175,6 +192,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Full`] where it does not fit.
+    #[inline]
     pub fn u8(&mut self, value: u8) -> Result<(), Full> {
         self.octets(&[value])
     }
@@ -183,6 +201,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Full`] where they do not fit.
+    #[inline]
     pub fn u16_le(&mut self, value: u16) -> Result<(), Full> {
         self.octets(&value.to_le_bytes())
     }
@@ -191,6 +210,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Full`] where they do not fit.
+    #[inline]
     pub fn u32_le(&mut self, value: u32) -> Result<(), Full> {
         self.octets(&value.to_le_bytes())
     }
@@ -199,6 +219,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Full`] where they do not fit.
+    #[inline]
     pub fn u64_le(&mut self, value: u64) -> Result<(), Full> {
         self.octets(&value.to_le_bytes())
     }
@@ -207,6 +228,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Full`] where they do not fit.
+    #[inline]
     pub fn u16_be(&mut self, value: u16) -> Result<(), Full> {
         self.octets(&value.to_be_bytes())
     }
@@ -215,6 +237,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`Full`] where they do not fit.
+    #[inline]
     pub fn u32_be(&mut self, value: u32) -> Result<(), Full> {
         self.octets(&value.to_be_bytes())
     }

@@ -1,6 +1,7 @@
 //! RS-485 as PROFIBUS uses it: characters of eleven bits, ten rates, octets without a pause.
 
 use core::fmt;
+use core::hash::{Hash, Hasher};
 
 use crate::{Duration, Station};
 
@@ -122,21 +123,24 @@ pub enum Input<'a> {
 /// The most octets that leave without a pause: an SD2 telegram with `LE` 249 (EN 50170-2).
 pub const TRANSMISSION_OCTETS: usize = 255;
 
-/// Octets to be sent without a pause: one telegram.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+/// Octets to be sent without a pause: one telegram. Two are equal where their octets are.
+#[derive(Clone, Copy)]
 pub struct Transmission {
     length: u8,
+    /// Behind `length` they are nobody's.
     octets: [u8; TRANSMISSION_OCTETS],
 }
 
 impl Transmission {
+    /// No octets: one to be written.
+    pub const EMPTY: Self = Self { length: 0, octets: [0; TRANSMISSION_OCTETS] };
+
     /// The octets, of which there are at most [`TRANSMISSION_OCTETS`]; `None` for more.
+    #[inline]
     #[must_use]
     pub fn new(octets: &[u8]) -> Option<Self> {
-        let mut transmission =
-            Self { length: u8::try_from(octets.len()).ok()?, octets: [0; TRANSMISSION_OCTETS] };
-        transmission.octets.get_mut(..octets.len())?.copy_from_slice(octets);
-        Some(transmission)
+        let mut transmission = Self::EMPTY;
+        transmission.set(octets).then_some(transmission)
     }
 
     /// The octets in the order in which they are sent.
@@ -144,6 +148,66 @@ impl Transmission {
     #[must_use]
     pub fn octets(&self) -> &[u8] {
         self.octets.get(..usize::from(self.length)).unwrap_or_default()
+    }
+
+    /// Whether there are no octets.
+    #[inline]
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.length == 0
+    }
+
+    /// Replaces the octets. Says whether they have room; none are left where they have not.
+    #[inline]
+    pub fn set(&mut self, octets: &[u8]) -> bool {
+        let (Some(room), Ok(length)) =
+            (self.octets.get_mut(..octets.len()), u8::try_from(octets.len()))
+        else {
+            self.length = 0;
+            return false;
+        };
+        // Most telegrams have 8 to 16 octets: two words that overlap, and no call.
+        match (octets.first_chunk::<8>(), octets.last_chunk::<8>()) {
+            (Some(first), Some(last)) if octets.len() <= 16 => {
+                if let Some(room) = room.first_chunk_mut() {
+                    *room = *first;
+                }
+                if let Some(room) = room.last_chunk_mut() {
+                    *room = *last;
+                }
+            }
+            _ => room.copy_from_slice(octets),
+        }
+        self.length = length;
+        true
+    }
+
+    /// Where octets are written in place, from the first one on; say with
+    /// [`set_length`](Self::set_length) how many. What was sent before may still stand there.
+    #[inline]
+    #[must_use]
+    pub const fn room(&mut self) -> &mut [u8; TRANSMISSION_OCTETS] {
+        &mut self.octets
+    }
+
+    /// The first `length` octets of the [room](Self::room) are to be sent.
+    #[inline]
+    pub const fn set_length(&mut self, length: u8) {
+        self.length = length;
+    }
+}
+
+impl PartialEq for Transmission {
+    fn eq(&self, other: &Self) -> bool {
+        self.octets() == other.octets()
+    }
+}
+
+impl Eq for Transmission {}
+
+impl Hash for Transmission {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.octets().hash(state);
     }
 }
 
@@ -170,6 +234,7 @@ pub trait Node: for<'a> Station<Input<'a> = Input<'a>, Output = Transmission> {
 mod tests {
     use super::*;
     use std::format;
+    use std::hash::DefaultHasher;
     use std::string::ToString;
 
     #[test]
@@ -192,6 +257,38 @@ mod tests {
             assert_eq!(transmission.octets(), &octets[..length]);
         }
         assert_eq!(Transmission::new(&[0; 256]), None);
+    }
+
+    #[test]
+    fn octets_behind_the_last_one_make_no_difference() {
+        let hash = |transmission: &Transmission| {
+            let mut hasher = DefaultHasher::new();
+            transmission.hash(&mut hasher);
+            hasher.finish()
+        };
+        let fresh = Transmission::new(&[0xE5]).unwrap();
+        let mut used = Transmission::new(&[0xDC, 2, 2]).unwrap();
+        assert_ne!(used, fresh);
+        used.room()[0] = 0xE5;
+        assert_ne!(used, fresh, "three octets");
+        used.set_length(1);
+        assert_eq!((used, used.octets(), hash(&used)), (fresh, &[0xE5][..], hash(&fresh)));
+        assert!(used.set(&[]) && used.is_empty());
+        assert_eq!(used, Transmission::EMPTY);
+    }
+
+    #[test]
+    fn octets_are_replaced_whole_or_by_none() {
+        let octets: [u8; 255] = core::array::from_fn(|place| place as u8);
+        let mut transmission = Transmission::new(&[0xEE; 255]).unwrap();
+        for length in 0..=255 {
+            assert!(transmission.set(&octets[..length]));
+            assert_eq!(transmission.octets(), &octets[..length]);
+            let behind = &transmission.room()[length..];
+            assert_eq!(behind, &[0xEE; 255][length..], "nothing behind {length} octets");
+        }
+        assert!(!transmission.set(&[0; 256]));
+        assert!(transmission.is_empty());
     }
 
     #[test]

@@ -18,18 +18,21 @@ impl Instant {
     pub const ZERO: Self = Self(0);
 
     /// The point `nanos` nanoseconds after the origin.
+    #[inline]
     #[must_use]
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
     /// Nanoseconds since the origin.
+    #[inline]
     #[must_use]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
 
     /// The span from `earlier` to `self`; zero where `earlier` is later.
+    #[inline]
     #[must_use]
     pub const fn since(self, earlier: Self) -> Duration {
         Duration(self.0.saturating_sub(earlier.0))
@@ -41,42 +44,49 @@ impl Duration {
     pub const ZERO: Self = Self(0);
 
     /// A span of `nanos` nanoseconds.
+    #[inline]
     #[must_use]
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
     /// A span of `micros` microseconds.
+    #[inline]
     #[must_use]
     pub const fn from_micros(micros: u64) -> Self {
         Self(micros.saturating_mul(1_000))
     }
 
     /// A span of `millis` milliseconds.
+    #[inline]
     #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
         Self(millis.saturating_mul(1_000_000))
     }
 
     /// A span of `secs` seconds.
+    #[inline]
     #[must_use]
     pub const fn from_secs(secs: u64) -> Self {
         Self(secs.saturating_mul(1_000_000_000))
     }
 
     /// The span in nanoseconds.
+    #[inline]
     #[must_use]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
 
     /// The span in whole milliseconds, rounded down.
+    #[inline]
     #[must_use]
     pub const fn as_millis(self) -> u64 {
         self.0 / 1_000_000
     }
 
     /// `factor` times the span.
+    #[inline]
     #[must_use]
     pub const fn times(self, factor: u64) -> Self {
         Self(self.0.saturating_mul(factor))
@@ -92,6 +102,7 @@ impl Deadline {
     pub const NEVER: Self = Self(Instant(u64::MAX));
 
     /// A deadline at `instant`.
+    #[inline]
     #[must_use]
     pub const fn at(instant: Instant) -> Self {
         Self(instant)
@@ -107,18 +118,21 @@ impl Deadline {
     }
 
     /// Whether there is none.
+    #[inline]
     #[must_use]
     pub const fn is_never(self) -> bool {
         self.0.0 == u64::MAX
     }
 
     /// When it is; `None` for never.
+    #[inline]
     #[must_use]
     pub const fn instant(self) -> Option<Instant> {
         if self.is_never() { None } else { Some(self.0) }
     }
 
     /// The earlier of the two.
+    #[inline]
     #[must_use]
     pub fn or_earlier(self, other: Self) -> Self {
         self.min(other)
@@ -137,6 +151,7 @@ impl Deadline {
 
 impl Default for Deadline {
     /// [`Deadline::NEVER`].
+    #[inline]
     fn default() -> Self {
         Self::NEVER
     }
@@ -161,12 +176,14 @@ pub fn earlier(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
 
 impl Add<Duration> for Instant {
     type Output = Self;
+    #[inline]
     fn add(self, span: Duration) -> Self {
         Self(self.0.saturating_add(span.0))
     }
 }
 
 impl AddAssign<Duration> for Instant {
+    #[inline]
     fn add_assign(&mut self, span: Duration) {
         *self = *self + span;
     }
@@ -174,6 +191,7 @@ impl AddAssign<Duration> for Instant {
 
 impl Sub<Duration> for Instant {
     type Output = Self;
+    #[inline]
     fn sub(self, span: Duration) -> Self {
         Self(self.0.saturating_sub(span.0))
     }
@@ -181,6 +199,7 @@ impl Sub<Duration> for Instant {
 
 impl Add for Duration {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self(self.0.saturating_add(other.0))
     }

@@ -127,6 +127,18 @@ fn with_bit_times_a_request_demands_an_idle_line() {
 }
 
 #[test]
+fn with_bit_times_bits_are_counted_to_the_nearest_half() {
+    // 32.5 bits at 500 kbit/s.
+    for (nanos, answer) in [(64_999, ""), (65_000, ANSWER)] {
+        let mut bench = Bench::power_up();
+        bench.hears("DC 02 02");
+        bench.wait(Duration::from_nanos(nanos));
+        bench.hears_after(0, &octets(FDL_STATUS));
+        assert_eq!(bench.answer(), answer, "{nanos} ns after a token");
+    }
+}
+
+#[test]
 fn with_bit_times_telegrams_may_come_octet_by_octet() {
     for rate in BaudRate::ALL {
         let mut bench = Bench::new(Baud::Fixed(rate), Timing::Exact);

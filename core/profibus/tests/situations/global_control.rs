@@ -75,16 +75,53 @@ fn clear_acts_once_also_on_outputs_that_wait() {
 }
 
 #[test]
-fn in_one_telegram_clear_comes_first_then_the_ends_then_the_beginnings() {
+fn in_one_telegram_clear_comes_before_sync_and_unsync() {
+    for command in [SYNC, UNSYNC] {
+        let mut bench = Bench::exchanging();
+        bench.global_control(2, SYNC, 0);
+        bench.exchanges("00 00 00 02", "00 00 12 34", &[]);
+        bench.global_control(2, CLEAR | command, 0);
+        assert_eq!(bench.toy.told, ["clear", "00 00 00 00"], "cleared before it is transferred");
+        assert_eq!(bench.slave.is_in_sync_mode(), command == SYNC);
+    }
+}
+
+/// EN 50170-2: both bits set switch the mode off.
+#[test]
+fn unsync_and_sync_in_one_telegram_transfer_once_and_end_sync_mode() {
     let mut bench = Bench::exchanging();
-    bench.global_control(2, SYNC | FREEZE, 0);
+    bench.global_control(2, SYNC | UNSYNC, 0);
+    assert!(!bench.slave.is_in_sync_mode(), "it does not begin either");
+    bench.exchanges("00 00 00 01", "00 00 12 34", &["00 00 00 01"]);
+    bench.global_control(2, SYNC, 0);
     bench.exchanges("00 00 00 02", "00 00 12 34", &[]);
+    bench.global_control(2, SYNC | UNSYNC, 0);
+    assert_eq!(bench.toy.told, ["00 00 00 02"], "what waited is transferred");
+    assert!(!bench.slave.is_in_sync_mode());
+    bench.exchanges("00 00 00 03", "00 00 12 34", &["00 00 00 03"]);
+}
+
+/// EN 50170-2: both bits set switch the mode off.
+#[test]
+fn unfreeze_and_freeze_in_one_telegram_end_freeze_mode() {
+    let mut bench = Bench::exchanging();
+    bench.global_control(2, FREEZE | UNFREEZE, 0);
+    assert!(!bench.slave.is_in_freeze_mode(), "it does not begin either");
+    bench.global_control(2, FREEZE, 0);
     bench.toy.inputs = [0, 0, 0, 9];
-    bench.global_control(2, CLEAR | UNSYNC | SYNC | UNFREEZE | FREEZE, 0);
-    assert_eq!(bench.toy.told, ["clear", "00 00 00 00"], "cleared before it is transferred");
-    assert!(bench.slave.is_in_sync_mode() && bench.slave.is_in_freeze_mode());
-    bench.toy.inputs = [0, 0, 0, 10];
-    bench.exchanges("00 00 00 04", "00 00 00 09", &[]);
+    bench.global_control(2, FREEZE | UNFREEZE, 0);
+    assert!(!bench.slave.is_in_freeze_mode());
+    bench.exchanges("00 00 00 00", "00 00 00 09", &["00 00 00 00"]);
+}
+
+#[test]
+fn the_end_of_one_mode_and_the_beginning_of_the_other_may_stand_in_one_telegram() {
+    let mut bench = Bench::exchanging();
+    bench.global_control(2, SYNC, 0);
+    bench.global_control(2, UNSYNC | FREEZE, 0);
+    assert!(!bench.slave.is_in_sync_mode() && bench.slave.is_in_freeze_mode());
+    bench.global_control(2, SYNC | UNFREEZE, 0);
+    assert!(bench.slave.is_in_sync_mode() && !bench.slave.is_in_freeze_mode());
 }
 
 #[test]
