@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -323,25 +322,13 @@ class Services(Walk):
             if time.time() - last > seconds + 1:
                 raise Wrong(f"the watchdog of {seconds:g} s has not expired after a second more")
             time.sleep(0.004)
-            with self.patience():
-                diagnosis = self.stranger.slave_diag()
+            diagnosis = self.stranger.slave_diag()
         lasted = self.wire.seen[-1].at - last
         expect(f"head afterwards in {state}", diagnosis.head, POWER_ON)
         expect_within("seconds to the expiry", lasted, seconds - 0.005, seconds + 0.3)
         if state == "DATA_EXCH":
             self.expect_rs(lambda: self.master.exchange(bytes(4)), "Data_Exchange afterwards")
         return lasted
-
-    @contextlib.contextmanager
-    def patience(self) -> Iterator[None]:
-        """For requests that meet the expiry, which may swallow them: a master repeats them."""
-        self.master.RESPONSE_SECONDS = self.stranger.RESPONSE_SECONDS = 0.04
-        try:
-            yield
-        except Silence:
-            pass
-        finally:
-            self.master.RESPONSE_SECONDS = self.stranger.RESPONSE_SECONDS = Master.RESPONSE_SECONDS
 
     def expires_without_its_master(self) -> str:
         seen = []
@@ -406,8 +393,7 @@ class Services(Walk):
         self.to("DATA_EXCH", replace(self.default, watchdog=(20, 1)))
         deadline = time.time() + 0.4
         while time.time() < deadline:
-            with self.patience():
-                action()
+            action()
             time.sleep(0.02)
         expect(f"state after {what}", self.state(), "WAIT_PRM")
         return what
@@ -430,6 +416,24 @@ class Services(Walk):
                 ),
             ]
         )
+
+    def answers_what_came_just_before_it_expired(self) -> str:
+        """The slave waits 255 bits with its answer, at 9600 26 ms; the watchdog expires in between."""
+        for what, ask in [
+            ("FDL status", self.stranger.fdl_status),
+            ("Slave_Diag", self.stranger.slave_diag),
+            ("Get_Cfg", self.stranger.get_cfg),
+        ]:
+            self.release()
+            self.to("DATA_EXCH", replace(self.default, watchdog=(10, 1), min_tsdr=255))
+            self.master.slave_diag()
+            asked = self.wire.seen[-2].at
+            time.sleep(max(0.0, asked + 0.090 - time.time()))
+            try:
+                ask()
+            except Silence as silence:
+                raise Wrong(f"{what} 90 ms after the last request: {silence}") from None
+        return "FDL status, Slave_Diag and Get_Cfg 10 ms before the expiry"
 
     def leaves_no_answer_behind_when_it_expires(self) -> str:
         self.to("DATA_EXCH", replace(self.default, watchdog=(10, 1)))
@@ -475,3 +479,5 @@ class Services(Walk):
             self.fresh(self.is_retriggered_by_any_request_of_its_master)
             self.fresh(self.is_not_retriggered_by_anything_else)
             self.fresh(self.leaves_no_answer_behind_when_it_expires)
+        with self.running_run(Start(baud="9.6k")):
+            self.fresh(self.answers_what_came_just_before_it_expired)

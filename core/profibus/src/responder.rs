@@ -110,6 +110,16 @@ impl Responder {
         self.request.set_length(0);
     }
 
+    /// The slave has no master any more. What is owed is said all the same, as it is from now on:
+    /// process data is for masters, so RS stands in its place.
+    pub(crate) fn lose_master(&mut self) {
+        if matches!(self.owed.answer, Answer::DataExchange | Answer::Inputs | Answer::Outputs) {
+            self.owed.answer = Answer::Bare(Reply::NotActivated);
+        }
+        self.answer.set_length(0);
+        self.forget();
+    }
+
     /// Nothing is owed any more. What the answer would have said is built anew for a retry, where
     /// it was not fetched.
     #[inline]

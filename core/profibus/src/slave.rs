@@ -134,8 +134,7 @@ impl<const N: usize> Slave<N> {
     #[inline]
     fn watch_master<A: Application>(&mut self, now: Instant, app: &mut A) {
         if self.machine.advance(now, app) {
-            self.responder.cancel();
-            self.responder.forget();
+            self.responder.lose_master();
         }
     }
 

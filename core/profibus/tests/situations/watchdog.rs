@@ -117,12 +117,29 @@ fn after_expiry_a_retry_is_a_new_request() {
 }
 
 #[test]
-fn an_answer_that_is_still_owed_when_it_expires_is_not_sent() {
-    // 1 ms, and 255 bits at 500 kbit/s are 0.51 ms: a request 0.8 ms later would be answered late.
-    let mut bench = Bench::power_up().then_parameterized("88 01 01 FF 05 9B 00 04");
+fn an_answer_that_is_still_owed_when_it_expires_tells_what_is_then() {
+    // 1 ms, and 255 bits at 500 kbit/s are 0.51 ms: a request 0.8 ms later is answered after it.
+    let parameterized = || Bench::power_up().then_parameterized("88 01 01 FF 05 9B 00 04");
+    let mut bench = parameterized();
     bench.hears(&telegram(7, 3, 0x7C, Some((60, 62)), ""));
     assert_eq!(bench.slave.state(), State::WaitCfg);
-    assert_eq!(bench.answer(), "");
+    let diagnosis = "02 05 00 FF 05 9B 02 00";
+    assert_eq!(bench.answer(), telegram(3, 7, 8, Some((62, 60)), diagnosis));
+    assert_eq!(bench.slave.state(), State::WaitPrm);
+    let mut bench = parameterized();
+    bench.hears("10 07 03 49 53 16");
+    assert_eq!(bench.answer(), "10 03 07 00 0A 16", "FDL status, in every state");
+    assert_eq!(bench.slave.state(), State::WaitPrm);
+}
+
+#[test]
+fn process_data_that_is_still_owed_when_it_expires_is_refused() {
+    let mut bench = Bench::power_up().then_parameterized("88 02 01 FF 05 9B 00 04");
+    bench = bench.then_configured("F1");
+    bench.wait(Duration::from_micros(900));
+    bench.hears(&telegram(7, 3, 0x7C, Some((56, 62)), ""));
+    assert_eq!(bench.slave.state(), State::DataExchange);
+    assert_eq!(bench.answer(), "10 03 07 03 0D 16");
     assert_eq!(bench.slave.state(), State::WaitPrm);
 }
 
