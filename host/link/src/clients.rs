@@ -32,6 +32,8 @@ pub(crate) struct Clients<S, P> {
     watch: Watch,
     clients: BTreeMap<usize, Client<S, P>>,
     next_token: usize,
+    /// What a client is told first.
+    greeting: fn() -> Option<P>,
     /// Clients that may have more to read: a socket tells once, and not again before it was read
     /// to its end.
     unread: VecDeque<usize>,
@@ -49,8 +51,11 @@ pub(crate) struct Client<S, P> {
 }
 
 impl<S: Default, P: Portion> Clients<S, P> {
-    /// Binds `endpoint`.
-    pub(crate) fn listen(endpoint: &Endpoint) -> Result<Self, LinkError> {
+    /// Binds `endpoint`; who comes is told the `greeting` first.
+    pub(crate) fn listen(
+        endpoint: &Endpoint,
+        greeting: fn() -> Option<P>,
+    ) -> Result<Self, LinkError> {
         let failed = |reason| LinkError::Listen { endpoint: endpoint.to_string(), reason };
         // The standard library's listener tries all addresses of a name, mio's takes one.
         let listener = std::net::TcpListener::bind(resolve(endpoint)?.as_slice());
@@ -65,7 +70,8 @@ impl<S: Default, P: Portion> Clients<S, P> {
             .map_err(LinkError::System)?;
         let clients = BTreeMap::new();
         let unread = VecDeque::new();
-        Ok(Self { address, listener, watch, clients, next_token: FIRST_CLIENT, unread })
+        let next_token = FIRST_CLIENT;
+        Ok(Self { address, listener, watch, clients, next_token, greeting, unread })
     }
 
     /// Where clients connect to, with the port the system chose where 0 was asked.
@@ -163,7 +169,10 @@ impl<S: Default, P: Portion> Clients<S, P> {
         let interest = Interest::READABLE | Interest::WRITABLE;
         self.watch.registry().register(&mut stream, Token(token), interest)?;
         self.next_token += 1;
-        let (output, state) = (Output::default(), S::default());
+        let (mut output, state) = (Output::default(), S::default());
+        if let Some(greeting) = (self.greeting)() {
+            output.push(greeting);
+        }
         self.clients.insert(
             token,
             Client { stream, address, output, state, is_unread: false, is_gone: false },

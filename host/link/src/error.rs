@@ -1,13 +1,12 @@
 //! Why a port cannot be opened or is lost.
 
 use std::io;
-use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use codewheel_station::can::BitRate;
 use thiserror::Error;
 
-use crate::{BusUri, Medium};
+use crate::{BusUri, InterfaceTrouble, Medium};
 
 /// Why a port cannot be opened or is lost: what was tried, what came back, what to do.
 #[derive(Debug, Error)]
@@ -39,23 +38,29 @@ pub enum LinkError {
     },
     /// The adapter refused to open its channel.
     #[error(
-        "the adapter at {peer} refused to open its channel (it answered O with BEL): another \
+        "the adapter of {bus} refused to open its channel (it answered O with BEL): another \
          program may hold it, or it lacks the bit rate; free the adapter and try again"
     )]
     Refused {
-        /// Where the adapter is.
-        peer: SocketAddr,
+        /// The bus as a URI.
+        bus: String,
     },
-    /// The connection to the adapter is gone.
-    #[error(
-        "the connection to the adapter at {peer} was lost: {reason}; start the adapter and \
-         then this program again"
-    )]
+    /// What leads to the bus is gone. Ports that others can be had for again do not end with it.
+    #[error("{bus} was lost: {reason}; start this program again")]
     Lost {
-        /// Where the adapter was.
-        peer: SocketAddr,
+        /// The bus as a URI.
+        bus: String,
         /// What the system said, or that the other side closed it.
         reason: String,
+    },
+    /// A CAN interface cannot be used as it is, and setting it up needs rights that this program
+    /// does not ask for.
+    #[error("cannot use the CAN interface {interface}: {}", .trouble.phrase(.interface))]
+    Interface {
+        /// Its name as given.
+        interface: String,
+        /// What is wrong with it, and what to type.
+        trouble: InterfaceTrouble,
     },
     /// The virtual bus runs at another bit rate.
     #[error(
@@ -96,23 +101,15 @@ pub enum LinkError {
         /// What is in the way.
         reason: String,
     },
-    /// The RS-485 line is gone.
-    #[error("the line {line} was lost: {reason}; {advice}")]
-    LineLost {
-        /// The line as a bus URI.
-        line: String,
-        /// What the system said, or that the other side closed it.
-        reason: String,
-        /// What to do.
-        advice: &'static str,
-    },
     /// This operating system has no such port.
-    #[error(
-        "{uri} needs a Unix system; write rs485-listen:HOST:PORT or rs485:HOST:PORT for RS-485 here"
-    )]
+    #[error("{uri} needs {needs}; here write {instead}")]
     NotHere {
         /// The bus as given.
         uri: BusUri,
+        /// The system that has it.
+        needs: &'static str,
+        /// What can be written on any system.
+        instead: &'static str,
     },
     /// The operating system cannot watch sockets.
     #[error(
@@ -122,8 +119,15 @@ pub enum LinkError {
     System(io::Error),
 }
 
+impl LinkError {
+    /// Whether what led to the bus is gone, and may come back.
+    pub(crate) const fn is_loss(&self) -> bool {
+        matches!(self, Self::Lost { .. })
+    }
+}
+
 /// What went wrong, without the number that the system appends.
-fn phrase(reason: &io::Error) -> String {
+pub(crate) fn phrase(reason: &io::Error) -> String {
     match reason.kind() {
         io::ErrorKind::AddrInUse => "address already in use".to_owned(),
         io::ErrorKind::AddrNotAvailable => "no such address on this machine".to_owned(),
@@ -159,11 +163,6 @@ fn connect_advice(reason: &io::Error) -> &'static str {
         io::ErrorKind::ConnectionRefused => "; nothing listens there: start the adapter first",
         _ => "; check the address, the network and that the adapter is running",
     }
-}
-
-/// What went wrong with a connection, as part of [`LinkError::Lost`].
-pub(crate) fn lost_phrase(reason: &io::Error) -> String {
-    phrase(reason)
 }
 
 #[cfg(test)]

@@ -29,18 +29,29 @@
 
 mod clients;
 mod error;
+mod interface;
+mod lasting;
 mod notice;
 mod output;
 mod port;
+#[cfg(unix)]
+mod pty;
 pub mod rs485;
+mod segment;
+#[cfg(unix)]
+mod serial;
 pub mod slcan;
 mod socket;
+#[cfg(target_os = "linux")]
+mod socketcan;
+pub mod socketcand;
 mod turn;
 mod uri;
 mod virtual_bus;
 
 pub use error::LinkError;
-pub use notice::Notice;
+pub use interface::InterfaceTrouble;
+pub use notice::{ControllerState, Notice};
 pub use port::{CanPort, Received, Waker, open};
 pub use rs485::{Rs485Loop, Rs485Port, Rs485Received, open_rs485};
 pub use turn::{Clock, Loop, Outcome, STAND_IN};

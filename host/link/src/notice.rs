@@ -24,11 +24,11 @@ pub enum Notice {
         /// Whether it can only listen (`L` instead of `O`).
         listen_only: bool,
     },
-    /// A client chose another bit rate than the segment has. A TCP segment has no bit time, so it
-    /// takes part all the same; on copper it would destroy every frame.
+    /// A client chose another bit rate than the segment has. A segment made of software has no bit
+    /// time, so it takes part all the same; on copper it would destroy every frame.
     OtherBitRate {
-        /// Where the client is.
-        client: SocketAddr,
+        /// Where the client is: its address, or `at` the path of a pty.
+        client: String,
         /// What it chose, in bits per second.
         chosen: u32,
         /// What the segment has.
@@ -110,6 +110,56 @@ pub enum Notice {
         /// What the system said.
         reason: String,
     },
+    /// A serial port talks to an SLCAN adapter at another speed than it was told.
+    SpeedNotTaken {
+        /// The speed it was told, in bits per second.
+        asked: u32,
+        /// What it has now.
+        taken: u32,
+    },
+    /// What leads to the bus is gone. The port tries to get it back, and has nothing until then.
+    BusLost {
+        /// The bus as a URI.
+        bus: String,
+        /// What the system said, or that the other side closed it.
+        reason: String,
+    },
+    /// What leads to the bus cannot be had yet; told when the reason changes.
+    BusStillLost {
+        /// What was tried, what came back and what to do.
+        reason: String,
+    },
+    /// The port has its bus again.
+    BusBack {
+        /// The bus as a URI.
+        bus: String,
+    },
+    /// A CAN controller changed its state by the count of its errors; bus-off is told by the
+    /// station that it concerns.
+    ControllerState {
+        /// The interface.
+        interface: String,
+        /// What its controller says of itself.
+        state: ControllerState,
+    },
+    /// A CAN controller is bus-off, and the interface does not restart it by itself.
+    ControllerStaysOff {
+        /// The interface.
+        interface: String,
+    },
+    /// A CAN controller or its driver had no room for frames that arrived, and lost them; told once
+    /// until the port was quiet.
+    ControllerOverrun {
+        /// The interface.
+        interface: String,
+    },
+    /// A CAN interface does not tell its bit rate, so nobody knows whether it is that of the bus.
+    BitRateUnknown {
+        /// The interface.
+        interface: String,
+        /// The rate that the bus is to have.
+        wanted: BitRate,
+    },
     /// A USB adapter collects octets for some time before it hands them over.
     AdapterHoldsBack {
         /// For how long, in milliseconds.
@@ -117,8 +167,19 @@ pub enum Notice {
     },
 }
 
+/// What a CAN controller says of itself, by the count of its errors (ISO 11898-1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ControllerState {
+    /// Few errors: it takes part.
+    Active,
+    /// A count of errors reached 96.
+    Warning,
+    /// A count of errors reached 128: it signals errors passively, and waits longer between frames.
+    Passive,
+}
+
 impl Notice {
-    /// Whether something went wrong, rather than a client coming or going.
+    /// Whether something went wrong, or is right again, rather than a client coming or going.
     #[must_use]
     pub const fn is_trouble(&self) -> bool {
         !matches!(
@@ -196,6 +257,42 @@ impl fmt::Display for Notice {
                 f,
                 "the serial port has no RS-485 mode ({reason}): the adapter must switch its \
                  transmitter itself"
+            ),
+            Self::SpeedNotTaken { asked, taken } => write!(
+                f,
+                "the serial port talks at {taken} bit/s where the adapter was to have {asked}: \
+                 write its speed behind the path, as in slcan:/dev/ttyUSB0@57600"
+            ),
+            Self::BusLost { bus, reason } => {
+                write!(f, "{bus} was lost: {reason}; it is tried until it is back")
+            }
+            Self::BusStillLost { reason } => write!(f, "not back yet: {reason}"),
+            Self::BusBack { bus } => write!(f, "{bus} is back"),
+            Self::ControllerState { interface, state } => match state {
+                ControllerState::Active => write!(f, "the controller of {interface} has recovered"),
+                ControllerState::Warning => write!(
+                    f,
+                    "the controller of {interface} counts many errors: check bit rate, termination \
+                     and wiring"
+                ),
+                ControllerState::Passive => write!(
+                    f,
+                    "the controller of {interface} is error passive: nobody acknowledges, or check \
+                     bit rate, termination and wiring"
+                ),
+            },
+            Self::ControllerStaysOff { interface } => write!(
+                f,
+                "the controller of {interface} is bus-off and stays so; type: sudo ip link set \
+                 {interface} type can restart"
+            ),
+            Self::ControllerOverrun { interface } => {
+                write!(f, "the controller of {interface} had no room for frames and lost some")
+            }
+            Self::BitRateUnknown { interface, wanted } => write!(
+                f,
+                "{interface} does not tell its bit rate: make sure that it is {}",
+                wanted.bits_per_second()
             ),
             Self::AdapterHoldsBack { milliseconds } => write!(
                 f,

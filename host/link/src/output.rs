@@ -63,6 +63,14 @@ impl<P: Portion> Output<P> {
         self.lost
     }
 
+    /// Forgets everything, also what is written in part, and counts it as lost. The other side has
+    /// forgotten what it had not read.
+    #[cfg(unix)]
+    pub(crate) fn clear(&mut self) {
+        self.lost += self.portions.drain(..).map(|portion| portion.loss()).sum::<u64>();
+        (self.octets, self.written, self.blocked) = (0, 0, false);
+    }
+
     /// The socket takes octets again.
     pub(crate) fn unblock(&mut self) {
         self.blocked = false;
@@ -168,6 +176,22 @@ mod tests {
         }
         assert_eq!(socket.taken, expected);
         assert!(output.is_empty());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_was_cleared_is_never_written_not_even_its_end() {
+        let mut output = Output::default();
+        let mut socket = Narrow { room: 5, taken: Vec::new() };
+        output.push(numbered(0));
+        output.push(numbered(1));
+        output.flush(&mut socket).unwrap();
+        output.clear();
+        assert_eq!(output.lost(), 2);
+        socket.room = usize::MAX;
+        output.push(numbered(2));
+        output.flush(&mut socket).unwrap();
+        assert_eq!(&socket.taken[5..], numbered(2).as_octets());
     }
 
     /// As long as a piece of a line can be.

@@ -2,14 +2,18 @@
 
 use std::fmt;
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
 use codewheel_station::can::{BitRate, Frame};
 
-use crate::slcan::{connect, listen};
-use crate::virtual_bus;
+use crate::lasting::lasting;
+use crate::segment::listen;
+#[cfg(target_os = "linux")]
+use crate::socketcan;
 use crate::{BusUri, LinkError, Medium, Notice};
+use crate::{slcan, socketcand, virtual_bus};
 
 /// A port to a CAN segment: frames out, frames and reports in, one place to wait.
 ///
@@ -61,9 +65,9 @@ pub enum Received {
     Frame(Frame),
     /// Our frame went out and another node acknowledged it.
     Sent(Frame),
-    /// The controller left the bus; what was handed to it is gone.
+    /// The controller left the bus, or what leads to it is lost; what was handed over is gone.
     BusOff,
-    /// The controller takes part again.
+    /// The controller takes part again, or the bus is there again.
     Recovered,
     /// Something for people.
     Notice(Notice),
@@ -100,16 +104,29 @@ impl fmt::Debug for Waker {
 
 /// Joins the bus that `uri` names, at `rate`.
 ///
-/// Takes at most 5 s (`slcan:`, when nobody answers); the other kinds do not wait.
+/// Takes at most 5 s (`slcan:HOST:PORT`, when nobody answers); the other kinds do not wait. An
+/// adapter, a connection or an interface that is lost later is sought until it is back. The station
+/// hears [`Received::BusOff`] and [`Received::Recovered`], people [`Notice::BusLost`] and
+/// [`Notice::BusBack`]; meanwhile the port takes nothing.
 ///
 /// # Errors
 /// [`LinkError`] when the address is taken or unknown, nobody answers, the virtual bus runs at
-/// another bit rate, or the bus carries no CAN.
+/// another bit rate, the interface is missing, down or at another bit rate, or the bus carries no
+/// CAN.
 pub fn open(uri: &BusUri, rate: BitRate) -> Result<Box<dyn CanPort>, LinkError> {
     Ok(match uri {
         BusUri::Virtual(name) => Box::new(virtual_bus::join(name, rate)?),
-        BusUri::SlcanListen(endpoint) => Box::new(listen(endpoint, rate)?),
-        BusUri::Slcan(endpoint) => Box::new(connect(endpoint, rate)?),
+        BusUri::SocketCan(interface) => open_interface(uri, interface, rate)?,
+        BusUri::SlcanListen(endpoint) => Box::new(listen::<slcan::Channel>(endpoint, rate)?),
+        BusUri::SocketcandListen(endpoint) => {
+            Box::new(listen::<socketcand::Session>(endpoint, rate)?)
+        }
+        BusUri::SlcanListenPty(path) => open_pty(uri, path, rate)?,
+        BusUri::Slcan(endpoint) => {
+            let endpoint = endpoint.clone();
+            Box::new(lasting(uri, move || Ok(boxed(slcan::connect(&endpoint, rate)?)))?)
+        }
+        BusUri::SlcanDevice { path, speed } => open_adapter(uri, path, *speed, rate)?,
         BusUri::Rs485Listen(_)
         | BusUri::Rs485ListenPty(_)
         | BusUri::Rs485(_)
@@ -117,4 +134,55 @@ pub fn open(uri: &BusUri, rate: BitRate) -> Result<Box<dyn CanPort>, LinkError> 
             return Err(LinkError::OtherMedium { uri: uri.clone(), wanted: Medium::Can });
         }
     })
+}
+
+fn boxed(port: impl CanPort + 'static) -> Box<dyn CanPort> {
+    Box::new(port)
+}
+
+#[cfg(target_os = "linux")]
+fn open_interface(
+    uri: &BusUri,
+    interface: &str,
+    rate: BitRate,
+) -> Result<Box<dyn CanPort>, LinkError> {
+    let interface = interface.to_owned();
+    Ok(Box::new(lasting(uri, move || Ok(boxed(socketcan::open(&interface, rate)?)))?))
+}
+
+#[cfg(unix)]
+fn open_pty(_: &BusUri, path: &Path, rate: BitRate) -> Result<Box<dyn CanPort>, LinkError> {
+    Ok(Box::new(slcan::listen_pty(path, rate)?))
+}
+
+#[cfg(unix)]
+fn open_adapter(
+    uri: &BusUri,
+    path: &Path,
+    speed: u32,
+    rate: BitRate,
+) -> Result<Box<dyn CanPort>, LinkError> {
+    let path = path.to_owned();
+    Ok(Box::new(lasting(uri, move || Ok(boxed(slcan::open_serial(&path, speed, rate)?)))?))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn open_interface(uri: &BusUri, _: &str, _: BitRate) -> Result<Box<dyn CanPort>, LinkError> {
+    Err(not_here(uri, "Linux"))
+}
+
+#[cfg(not(unix))]
+fn open_pty(uri: &BusUri, _: &Path, _: BitRate) -> Result<Box<dyn CanPort>, LinkError> {
+    Err(not_here(uri, "a Unix system"))
+}
+
+#[cfg(not(unix))]
+fn open_adapter(uri: &BusUri, _: &Path, _: u32, _: BitRate) -> Result<Box<dyn CanPort>, LinkError> {
+    Err(not_here(uri, "a Unix system"))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn not_here(uri: &BusUri, needs: &'static str) -> LinkError {
+    let instead = "slcan:HOST:PORT, slcan-listen:HOST:PORT or socketcand-listen:HOST:PORT for CAN";
+    LinkError::NotHere { uri: uri.clone(), needs, instead }
 }

@@ -9,19 +9,39 @@ use thiserror::Error;
 
 /// The name of a bus: where the frames or octets go and how to get there.
 ///
-/// Written and read as `virtual:NAME`; for CAN as `slcan-listen:HOST:PORT` or `slcan:HOST:PORT`;
-/// for RS-485 as `rs485-listen:HOST:PORT`, `rs485-listen:pty:PATH`, `rs485:HOST:PORT` or
-/// `rs485:PATH`. A path begins with `/` or `.`, as `/dev/ttyUSB0` and `./line` do.
+/// Written and read as `virtual:NAME`; for CAN as `socketcan:INTERFACE`, `slcan:PATH`,
+/// `slcan:PATH@SPEED`, `slcan:HOST:PORT`, `slcan-listen:HOST:PORT`, `slcan-listen:pty:PATH` or
+/// `socketcand-listen:HOST:PORT`; for RS-485 as `rs485-listen:HOST:PORT`, `rs485-listen:pty:PATH`,
+/// `rs485:HOST:PORT` or `rs485:PATH`. A path begins with `/` or `.`, as `/dev/ttyUSB0` and `./line`
+/// do.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum BusUri {
     /// `virtual:NAME`: a bus inside this process, shared by all who give the same name.
     Virtual(String),
+    /// `socketcan:can0`: a CAN interface of this machine's Linux.
+    SocketCan(String),
     /// `slcan-listen:HOST:PORT`: we play the SLCAN adapter that others connect to; port 0 takes
     /// any free one.
     SlcanListen(Endpoint),
+    /// `slcan-listen:pty:PATH`: we play the SLCAN adapter, and PATH becomes the serial port at which
+    /// a program on this machine finds it.
+    SlcanListenPty(PathBuf),
     /// `slcan:HOST:PORT`: we connect to an SLCAN adapter; the port is 1 … 65535.
     Slcan(Endpoint),
+    /// `slcan:/dev/ttyACM0`, `slcan:/dev/ttyUSB0@57600`: an SLCAN adapter at a serial port of this
+    /// machine.
+    SlcanDevice {
+        /// The serial port.
+        path: PathBuf,
+        /// How fast adapter and computer talk, in bit/s; [`SLCAN_SPEED`](Self::SLCAN_SPEED) where
+        /// the text says nothing. Adapters with a USB port of their own ignore it. It is none of the
+        /// bit rate of the bus.
+        speed: u32,
+    },
+    /// `socketcand-listen:HOST:PORT`: we play the socketcand server that others connect to; port 0
+    /// takes any free one.
+    SocketcandListen(Endpoint),
     /// `rs485-listen:HOST:PORT`: we are the line, as raw octets, that others connect to; port 0
     /// takes any free one.
     Rs485Listen(Endpoint),
@@ -53,7 +73,8 @@ pub struct Endpoint {
 }
 
 /// How a CAN segment is written.
-const CAN_FORMS: &str = "slcan-listen:HOST:PORT or slcan:HOST:PORT for CAN";
+const CAN_FORMS: &str = "socketcan:can0, slcan:/dev/tty…, slcan:HOST:PORT, slcan-listen:HOST:PORT, \
+                         slcan-listen:pty:PATH or socketcand-listen:HOST:PORT for CAN";
 
 /// How an RS-485 line is written.
 const RS485_FORMS: &str = "rs485-listen:HOST:PORT, rs485-listen:pty:PATH, rs485:HOST:PORT or \
@@ -116,12 +137,20 @@ impl fmt::Display for Endpoint {
 }
 
 impl BusUri {
+    /// How fast a serial port talks to an SLCAN adapter where the text does not say: 115 200 bit/s.
+    pub const SLCAN_SPEED: u32 = 115_200;
+
     /// What the bus carries, so that a device of another kind can be refused in time.
     #[must_use]
     pub const fn medium(&self) -> Medium {
         match self {
             Self::Virtual(_) => Medium::Any,
-            Self::SlcanListen(_) | Self::Slcan(_) => Medium::Can,
+            Self::SocketCan(_)
+            | Self::SlcanListen(_)
+            | Self::SlcanListenPty(_)
+            | Self::Slcan(_)
+            | Self::SlcanDevice { .. }
+            | Self::SocketcandListen(_) => Medium::Can,
             Self::Rs485Listen(_)
             | Self::Rs485ListenPty(_)
             | Self::Rs485(_)
@@ -171,6 +200,31 @@ fn path(text: &str) -> Result<PathBuf, &'static str> {
     }
 }
 
+/// The name of a network interface: 1 … 15 octets, none of them a blank or `/` (Linux,
+/// `dev_valid_name`).
+fn interface(text: &str) -> Result<String, &'static str> {
+    let spelled = |octet: u8| octet.is_ascii_graphic() && octet != b'/' && octet != b':';
+    match text {
+        "" => Err(" (the interface is missing)"),
+        "." | ".." => Err(" (that is no interface)"),
+        _ if text.len() > 15 => Err(" (an interface has at most 15 letters)"),
+        _ if !text.bytes().all(spelled) => Err(" (that is no interface)"),
+        _ => Ok(text.to_owned()),
+    }
+}
+
+/// The serial port of an adapter, and its speed.
+fn adapter(text: &str) -> Result<BusUri, &'static str> {
+    let (path_text, speed) = match text.rsplit_once('@') {
+        Some((path, digits)) if digits.bytes().all(|octet| octet.is_ascii_digit()) => {
+            let speed = digits.parse().ok().filter(|speed| *speed > 0);
+            (path, speed.ok_or(" (that is no speed of a serial port)")?)
+        }
+        _ => (text, BusUri::SLCAN_SPEED),
+    };
+    Ok(BusUri::SlcanDevice { path: path(path_text)?, speed })
+}
+
 /// The endpoint that somebody else listens on.
 fn remote(text: &str) -> Result<Endpoint, &'static str> {
     match Endpoint::parse(text)? {
@@ -193,7 +247,15 @@ impl FromStr for BusUri {
                 Err(invalid(" (a name has no blanks)"))
             }
             "virtual" => Ok(Self::Virtual(rest.to_owned())),
-            "slcan-listen" => Endpoint::parse(rest).map(Self::SlcanListen).map_err(invalid),
+            "socketcan" => interface(rest).map(Self::SocketCan).map_err(invalid),
+            "slcan-listen" => match rest.strip_prefix("pty:") {
+                Some(link) => path(link).map(Self::SlcanListenPty).map_err(invalid),
+                None => Endpoint::parse(rest).map(Self::SlcanListen).map_err(invalid),
+            },
+            "socketcand-listen" => {
+                Endpoint::parse(rest).map(Self::SocketcandListen).map_err(invalid)
+            }
+            "slcan" if is_path(rest) => adapter(rest).map_err(invalid),
             "slcan" => remote(rest).map(Self::Slcan).map_err(invalid),
             "rs485-listen" => match rest.strip_prefix("pty:") {
                 Some(link) => path(link).map(Self::Rs485ListenPty).map_err(invalid),
@@ -210,7 +272,14 @@ impl fmt::Display for BusUri {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Virtual(name) => write!(f, "virtual:{name}"),
+            Self::SocketCan(interface) => write!(f, "socketcan:{interface}"),
             Self::SlcanListen(endpoint) => write!(f, "slcan-listen:{endpoint}"),
+            Self::SlcanListenPty(path) => write!(f, "slcan-listen:pty:{}", path.display()),
+            Self::SlcanDevice { path, speed: Self::SLCAN_SPEED } => {
+                write!(f, "slcan:{}", path.display())
+            }
+            Self::SlcanDevice { path, speed } => write!(f, "slcan:{}@{speed}", path.display()),
+            Self::SocketcandListen(endpoint) => write!(f, "socketcand-listen:{endpoint}"),
             Self::Slcan(endpoint) => write!(f, "slcan:{endpoint}"),
             Self::Rs485Listen(endpoint) => write!(f, "rs485-listen:{endpoint}"),
             Self::Rs485ListenPty(path) => write!(f, "rs485-listen:pty:{}", path.display()),
@@ -234,6 +303,13 @@ mod tests {
             "slcan-listen:[::1]:4001",
             "slcan:adapter-7.plant.example:65535",
             "slcan:[fe80::1]:4001",
+            "slcan:/dev/ttyACM0",
+            "slcan:/dev/ttyUSB0@57600",
+            "slcan:/dev/serial/by-id/usb-CANable@home-if00",
+            "slcan-listen:pty:/tmp/adapter",
+            "socketcan:can0",
+            "socketcan:vcan-1.2",
+            "socketcand-listen:127.0.0.1:29536",
             "rs485-listen:127.0.0.1:4002",
             "rs485-listen:[::1]:0",
             "rs485-listen:pty:/tmp/line",
@@ -255,6 +331,10 @@ mod tests {
             ("virtual:lab", Medium::Any),
             ("slcan-listen:127.0.0.1:0", Medium::Can),
             ("slcan:127.0.0.1:4001", Medium::Can),
+            ("slcan:/dev/ttyACM0", Medium::Can),
+            ("slcan-listen:pty:./adapter", Medium::Can),
+            ("socketcan:can0", Medium::Can),
+            ("socketcand-listen:[::1]:0", Medium::Can),
             ("rs485-listen:127.0.0.1:0", Medium::Rs485),
             ("rs485-listen:pty:/tmp/line", Medium::Rs485),
             ("rs485:127.0.0.1:4002", Medium::Rs485),
@@ -262,6 +342,17 @@ mod tests {
         ] {
             assert_eq!(text.parse::<BusUri>().unwrap().medium(), medium, "{text}");
         }
+    }
+
+    #[test]
+    fn an_adapter_has_the_speed_that_is_said_or_the_usual_one() {
+        let speed = |text: &str| match text.parse() {
+            Ok(BusUri::SlcanDevice { speed, .. }) => speed,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(speed("slcan:/dev/ttyUSB0"), 115_200);
+        assert_eq!(speed("slcan:/dev/ttyUSB0@57600"), 57_600);
+        assert_eq!("slcan:/a@115200".parse::<BusUri>().unwrap().to_string(), "slcan:/a");
     }
 
     #[test]
@@ -280,8 +371,18 @@ mod tests {
             "slcan:::1:4001",
             "slcan:[::1]4001",
             "slcan:[host]:4001",
-            "slcan:/dev/ttyACM0",
+            "slcan:ttyACM0",
+            "slcan:/dev/",
+            "slcan:/dev/ttyACM0@0",
+            "slcan:/dev/ttyACM0@99999999999",
             "slcan-listen::4001",
+            "slcan-listen:/dev/ttyACM0",
+            "slcan-listen:pty:adapter",
+            "socketcan:",
+            "socketcan:can 0",
+            "socketcan:../can0",
+            "socketcan:an-interface-too-long",
+            "socketcand-listen:can0",
             "SLCAN:host:1",
             "/dev/ttyUSB0",
             "rs485:",
@@ -302,8 +403,12 @@ mod tests {
             assert!(error.starts_with(&format!("{text:?} names no bus")), "{error}");
             for form in [
                 "virtual:NAME",
-                "slcan-listen:HOST:PORT",
+                "socketcan:can0",
+                "slcan:/dev/tty",
                 "slcan:HOST:PORT",
+                "slcan-listen:HOST:PORT",
+                "slcan-listen:pty:PATH",
+                "socketcand-listen:HOST:PORT",
                 "rs485-listen:HOST:PORT",
                 "rs485-listen:pty:PATH",
                 "rs485:HOST:PORT",

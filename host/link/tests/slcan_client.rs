@@ -116,7 +116,8 @@ fn an_adapter_that_refuses_a_command_is_reported_and_one_that_stays_closed_is_an
     assert_eq!(notice, Some(Received::Notice(Notice::CommandRefused { command })));
     let error = port.receive(Some(PATIENCE)).unwrap_err();
     assert!(matches!(error, LinkError::Refused { .. }), "{error}");
-    assert!(port.send(&Frame::standard(0, &[])).is_err());
+    assert!(!port.send(&Frame::standard(0, &[])).unwrap());
+    assert!(port.receive(None).is_err(), "it stays closed");
 }
 
 #[test]
@@ -167,8 +168,10 @@ fn a_lost_connection_is_said_after_what_had_arrived() {
     peer.say("\r\r\rt42D0\rt42");
     drop(peer);
     assert_eq!(next(port.as_mut()), Received::Frame(Frame::standard(0x42D, &[])));
-    let error = port.receive(None).unwrap_err().to_string();
-    assert!(error.contains("was lost: the other side closed it"), "{error}");
+    let reason = "the other side closed it".to_owned();
+    let lost = port.receive(Some(PATIENCE)).unwrap();
+    assert_eq!(lost, Some(Received::Notice(Notice::BusLost { bus: uri, reason })));
+    assert_eq!(next(port.as_mut()), Received::BusOff);
 }
 
 #[test]

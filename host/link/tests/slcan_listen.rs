@@ -84,7 +84,11 @@ fn people_hear_who_comes_at_which_rate_and_goes() {
         [
             Notice::ClientConnected { client: address },
             Notice::ClientOpened { client: address, listen_only: false },
-            Notice::OtherBitRate { client: address, chosen: 500_000, segment: BitRate::Kbit125 },
+            Notice::OtherBitRate {
+                client: address.to_string(),
+                chosen: 500_000,
+                segment: BitRate::Kbit125,
+            },
             Notice::ClientLeft { client: address, frames_lost: 0 },
         ]
         .map(Received::Notice)

@@ -15,7 +15,7 @@ use crate::{Endpoint, LinkError, Notice, Waker};
 
 /// Binds `endpoint` and is a line.
 pub(super) fn listen(endpoint: &Endpoint) -> Result<ListenPort, LinkError> {
-    Ok(ListenPort { clients: Clients::listen(endpoint)?, inbox: VecDeque::new() })
+    Ok(ListenPort { clients: Clients::listen(endpoint, || None)?, inbox: VecDeque::new() })
 }
 
 /// A line whose wire is this object: what one says, all others hear, in one order. Two who speak at

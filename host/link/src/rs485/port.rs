@@ -2,11 +2,13 @@
 
 use std::fmt;
 use std::net::SocketAddr;
+use std::path::Path;
 use std::time::Duration;
 
 use codewheel_station::rs485::{BaudRate, Transmission};
 
 use super::{listen, tcp};
+use crate::lasting::lasting;
 use crate::{BusUri, LinkError, Medium, Notice, Waker};
 
 /// A port to an RS-485 line: telegrams out, octets and reports in, one place to wait.
@@ -70,7 +72,9 @@ pub enum Rs485Received {
 
 /// Joins the line that `uri` names, at `rate` where it has one.
 ///
-/// Takes at most 5 s (`rs485:HOST:PORT`, when nobody answers); the other kinds do not wait.
+/// Takes at most 5 s (`rs485:HOST:PORT`, when nobody answers); the other kinds do not wait. A serial
+/// port or a connection that is lost later is sought until it is back; what is sent meanwhile is
+/// gone, and nothing is heard. [`Notice::BusLost`] and [`Notice::BusBack`] tell of it.
 ///
 /// # Errors
 /// [`LinkError`] when the address is taken or unknown, nobody answers, the path is no serial port
@@ -79,39 +83,47 @@ pub enum Rs485Received {
 pub fn open_rs485(uri: &BusUri, rate: BaudRate) -> Result<Box<dyn Rs485Port>, LinkError> {
     Ok(match uri {
         BusUri::Rs485Listen(endpoint) => Box::new(listen::listen(endpoint)?),
-        BusUri::Rs485(endpoint) => Box::new(tcp::connect(endpoint)?),
+        BusUri::Rs485(endpoint) => {
+            let endpoint = endpoint.clone();
+            Box::new(lasting(uri, move || Ok(boxed(tcp::connect(&endpoint)?)))?)
+        }
         BusUri::Rs485ListenPty(path) => open_pty(uri, path)?,
         BusUri::Rs485Device(path) => open_terminal(uri, path, rate)?,
-        BusUri::Virtual(_) | BusUri::SlcanListen(_) | BusUri::Slcan(_) => {
-            return Err(LinkError::OtherMedium { uri: uri.clone(), wanted: Medium::Rs485 });
-        }
+        _ => return Err(LinkError::OtherMedium { uri: uri.clone(), wanted: Medium::Rs485 }),
     })
 }
 
+fn boxed(port: impl Rs485Port + 'static) -> Box<dyn Rs485Port> {
+    Box::new(port)
+}
+
 #[cfg(unix)]
-fn open_pty(_: &BusUri, path: &std::path::Path) -> Result<Box<dyn Rs485Port>, LinkError> {
+fn open_pty(_: &BusUri, path: &Path) -> Result<Box<dyn Rs485Port>, LinkError> {
     Ok(Box::new(super::pty::listen(path)?))
 }
 
 #[cfg(unix)]
 fn open_terminal(
-    _: &BusUri,
-    path: &std::path::Path,
+    uri: &BusUri,
+    path: &Path,
     rate: BaudRate,
 ) -> Result<Box<dyn Rs485Port>, LinkError> {
-    Ok(Box::new(super::terminal::open(path, rate)?))
+    let path = path.to_owned();
+    Ok(Box::new(lasting(uri, move || Ok(boxed(super::terminal::open(&path, rate)?)))?))
 }
 
 #[cfg(not(unix))]
-fn open_pty(uri: &BusUri, _: &std::path::Path) -> Result<Box<dyn Rs485Port>, LinkError> {
-    Err(LinkError::NotHere { uri: uri.clone() })
+fn open_pty(uri: &BusUri, _: &Path) -> Result<Box<dyn Rs485Port>, LinkError> {
+    Err(not_here(uri))
 }
 
 #[cfg(not(unix))]
-fn open_terminal(
-    uri: &BusUri,
-    _: &std::path::Path,
-    _: BaudRate,
-) -> Result<Box<dyn Rs485Port>, LinkError> {
-    Err(LinkError::NotHere { uri: uri.clone() })
+fn open_terminal(uri: &BusUri, _: &Path, _: BaudRate) -> Result<Box<dyn Rs485Port>, LinkError> {
+    Err(not_here(uri))
+}
+
+#[cfg(not(unix))]
+fn not_here(uri: &BusUri) -> LinkError {
+    let instead = "rs485-listen:HOST:PORT or rs485:HOST:PORT for RS-485";
+    LinkError::NotHere { uri: uri.clone(), needs: "a Unix system", instead }
 }

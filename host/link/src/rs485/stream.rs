@@ -11,7 +11,7 @@ use mio::Token;
 
 use super::PIECE;
 use super::port::{Rs485Port, Rs485Received};
-use crate::error::lost_phrase;
+use crate::error::phrase;
 use crate::output::{Output, Portion};
 use crate::socket::{Limit, Watch};
 use crate::{LinkError, Notice, Waker};
@@ -40,9 +40,6 @@ pub(super) trait Line: Read + Write + Send + fmt::Debug {
     fn set_baud_rate(&mut self, _rate: BaudRate) -> io::Result<Vec<Notice>> {
         Ok(Vec::new())
     }
-
-    /// What to do when the line is lost.
-    fn advice(&self) -> &'static str;
 
     /// The line as a bus URI.
     fn describe(&self) -> String;
@@ -96,13 +93,13 @@ impl<L: Line> StreamPort<L> {
             }
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => self.is_unread = false,
-            Err(error) => self.lose(lost_phrase(&error)),
+            Err(error) => self.lose(phrase(&error)),
         }
     }
 
     fn flush(&mut self) {
         if let Err(error) = self.output.flush(&mut self.line) {
-            self.lose(lost_phrase(&error));
+            self.lose(phrase(&error));
         }
     }
 
@@ -112,11 +109,7 @@ impl<L: Line> StreamPort<L> {
     }
 
     fn lost(&self, reason: &str) -> LinkError {
-        LinkError::LineLost {
-            line: self.line.describe(),
-            reason: reason.to_owned(),
-            advice: self.line.advice(),
-        }
+        LinkError::Lost { bus: self.line.describe(), reason: reason.to_owned() }
     }
 
     fn tell_unread(&mut self) {
@@ -187,7 +180,7 @@ impl<L: Line> Rs485Port for StreamPort<L> {
     fn set_baud_rate(&mut self, rate: BaudRate) -> Result<(), LinkError> {
         match self.line.set_baud_rate(rate) {
             Ok(notices) => self.inbox.extend(notices.into_iter().map(Rs485Received::Notice)),
-            Err(error) => self.lose(lost_phrase(&error)),
+            Err(error) => self.lose(phrase(&error)),
         }
         Ok(())
     }

@@ -47,10 +47,6 @@ impl Write for Connection {
 }
 
 impl Line for Connection {
-    fn advice(&self) -> &'static str {
-        "start the other side and then this program again"
-    }
-
     fn describe(&self) -> String {
         format!("rs485:{}", self.endpoint)
     }

@@ -1,29 +1,27 @@
 //! `rs485:PATH`: a serial port of this machine.
 
 use std::collections::VecDeque;
-use std::fs::{self, File, OpenOptions};
+use std::fs::File;
 use std::io::{self, Read, Write};
 use std::os::fd::AsRawFd;
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use codewheel_station::rs485::BaudRate;
 use mio::Interest;
 use mio::unix::SourceFd;
-use rustix::fs::OFlags;
 use rustix::termios::{
-    ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, ioctl_tiocexcl,
-    ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr,
+    ControlModes, InputModes, OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr,
 };
 
 use self::marks::Marks;
 use super::port::Rs485Received;
 use super::stream::{Line, STREAM, StreamPort};
+use crate::serial::{self, Claim};
 use crate::socket::Watch;
 use crate::{LinkError, Notice};
 
-mod adapter;
 mod marks;
+mod transmitter;
 
 /// How far a rate may be from its nominal value, in percent. Between two stations 4 % would break
 /// the stop bit of a character; the other side has its tolerance too.
@@ -32,23 +30,20 @@ const RATE_TOLERANCE: u32 = 1;
 /// Opens the serial port at `path` with 8E1 at `rate`, for us alone.
 pub(super) fn open(path: &Path, rate: BaudRate) -> Result<StreamPort<Terminal>, LinkError> {
     let failed = |reason| LinkError::Device { path: path.to_owned(), reason };
-    // Without waiting: some drivers hold `open` up until the other side shows a carrier.
-    let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits().cast_signed();
-    let file = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path);
-    let file = file.map_err(failed)?;
     let mut terminal = Terminal {
-        file,
+        file: serial::open(path).map_err(failed)?,
         path: path.to_owned(),
-        is_pty: is_pty(path),
+        is_pty: serial::is_pty(path),
+        claim: None,
         marks: None,
         rate,
         missed: Vec::new(),
     };
     let mut notices = terminal.set_up().map_err(failed)?;
     if !terminal.is_pty {
-        ioctl_tiocexcl(&terminal.file).map_err(|error| failed(error.into()))?;
-        notices.extend(adapter::switch_transmitter(&terminal.file));
-        notices.extend(adapter::hurry(path));
+        terminal.claim = Some(Claim::on(&terminal.file).map_err(failed)?);
+        notices.extend(transmitter::switch_transmitter(&terminal.file));
+        notices.extend(serial::hurry(path));
     }
     // What came before is nobody's.
     tcflush(&terminal.file, QueueSelector::IOFlush).map_err(|error| failed(error.into()))?;
@@ -61,18 +56,13 @@ pub(super) fn open(path: &Path, rate: BaudRate) -> Result<StreamPort<Terminal>, 
     Ok(StreamPort::new(terminal, watch, notices))
 }
 
-/// Whether `path` leads to the programs' side of a pty: such a port has no rate, no parity and no
-/// transmitter, and may be shared.
-fn is_pty(path: &Path) -> bool {
-    fs::canonicalize(path).is_ok_and(|device| device.starts_with("/dev/pts"))
-}
-
 /// An open serial port.
 #[derive(Debug)]
 pub(super) struct Terminal {
     file: File,
     path: PathBuf,
     is_pty: bool,
+    claim: Option<Claim>,
     /// Reads what the driver writes about broken characters, where it does.
     marks: Option<Marks>,
     rate: BaudRate,
@@ -86,19 +76,9 @@ impl Terminal {
     /// without a word.
     fn set_up(&mut self) -> io::Result<Vec<Notice>> {
         let mut settings = tcgetattr(&self.file)?;
-        settings.make_raw();
-        settings.input_modes -= InputModes::IGNPAR | InputModes::IGNBRK | InputModes::BRKINT;
-        settings.input_modes -= InputModes::IXOFF | InputModes::IXANY;
+        serial::pass_octets(&mut settings);
         settings.input_modes |= InputModes::INPCK | InputModes::PARMRK;
-        settings.control_modes -= ControlModes::CSIZE
-            | ControlModes::CSTOPB
-            | ControlModes::PARODD
-            | ControlModes::CRTSCTS
-            | ControlModes::HUPCL;
-        settings.control_modes |=
-            ControlModes::CS8 | ControlModes::PARENB | ControlModes::CLOCAL | ControlModes::CREAD;
-        settings.special_codes[SpecialCodeIndex::VMIN] = 1;
-        settings.special_codes[SpecialCodeIndex::VTIME] = 0;
+        settings.control_modes |= ControlModes::PARENB;
         settings.set_speed(self.rate.bits_per_second())?;
         tcsetattr(&self.file, OptionalActions::Now, &settings)?;
         let settings = tcgetattr(&self.file)?;
@@ -166,20 +146,7 @@ impl Line for Terminal {
         Ok(self.judge(taken).into_iter().collect())
     }
 
-    fn advice(&self) -> &'static str {
-        "plug the adapter in and start this program again"
-    }
-
     fn describe(&self) -> String {
         format!("rs485:{}", self.path.display())
-    }
-}
-
-impl Drop for Terminal {
-    /// Lets others open the port again where somebody else keeps it open.
-    fn drop(&mut self) {
-        if !self.is_pty {
-            let _ = ioctl_tiocnxcl(&self.file);
-        }
     }
 }

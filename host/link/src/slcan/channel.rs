@@ -4,6 +4,7 @@ use codewheel_station::can::{Frame, Identifier};
 
 use super::command::{Command, CommandDecoder};
 use super::line::Line;
+use crate::segment::{self, Guest, Moment};
 
 /// One client's channel to the bus: closed, open, or open to listen only.
 ///
@@ -25,23 +26,8 @@ enum Access {
     ListenOnly,
 }
 
-/// What a client's line leads to, in the order in which it must be done.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effect {
-    /// Write this to the client.
-    Answer(Line),
-    /// Put this on the bus.
-    Transmit(Frame),
-    /// The client takes part from now on.
-    Opened {
-        /// Whether it can only listen.
-        listen_only: bool,
-        /// The bit rate it chose, in bits per second; `None` when it joins at the segment's.
-        bit_rate: Option<u32>,
-    },
-    /// The client no longer takes part.
-    Closed,
-}
+/// What a client's line leads to.
+pub type Effect = segment::Effect<Line>;
 
 impl Channel {
     /// Takes octets of the client, in pieces of any size, and tells `effect` what to do.
@@ -100,6 +86,19 @@ impl Channel {
             _ => Line::REFUSED,
         };
         effect(Effect::Answer(answer));
+    }
+}
+
+impl Guest for Channel {
+    type Word = Line;
+    const KIND: &'static str = "slcan-listen";
+
+    fn hear(&mut self, octets: &[u8], effect: impl FnMut(Effect)) {
+        self.receive(octets, effect);
+    }
+
+    fn tell(&mut self, frame: &Frame, at: Moment) -> Option<Line> {
+        self.deliver(frame, at.milliseconds)
     }
 }
 

@@ -1,7 +1,8 @@
-//! `slcan:HOST:PORT`: we are the client of an adapter, or of another codewheel.
+//! `slcan:`: we are the client of an adapter, or of another codewheel, over TCP or a serial port.
 
 use std::collections::VecDeque;
-use std::io::{self, Read};
+use std::fmt;
+use std::io::{self, Read, Write};
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
@@ -11,12 +12,13 @@ use mio::{Interest, Token};
 
 use super::answer::{Answer, AnswerDecoder};
 use super::line::Line;
-use crate::error::lost_phrase;
+use crate::error::phrase;
 use crate::output::Output;
 use crate::socket::{Limit, Watch, connect_to};
 use crate::{CanPort, Endpoint, LinkError, Notice, Received, Waker};
 
-const ADAPTER: Token = Token(1);
+/// The token by which the adapter is watched.
+pub(super) const ADAPTER: Token = Token(1);
 
 /// How long an adapter that answers may take for one answer before it counts as silent.
 const ANSWER_LIMIT: Duration = Duration::from_secs(1);
@@ -28,47 +30,27 @@ const UNANSWERED: usize = 64;
 const PIECE: usize = 4096;
 
 /// Connects to `endpoint` and asks the adapter there to open its channel at `rate`.
-pub(crate) fn connect(endpoint: &Endpoint, rate: BitRate) -> Result<ClientPort, LinkError> {
+pub(crate) fn connect(
+    endpoint: &Endpoint,
+    rate: BitRate,
+) -> Result<ClientPort<TcpStream>, LinkError> {
     let failed = |reason| LinkError::Connect { endpoint: endpoint.to_string(), reason };
     let stream = connect_to(endpoint)?;
     stream.set_nodelay(true).map_err(failed)?;
     stream.set_nonblocking(true).map_err(failed)?;
-    let peer = stream.peer_addr().map_err(failed)?;
     let mut stream = TcpStream::from_std(stream);
     let watch = Watch::new()?;
     watch
         .registry()
         .register(&mut stream, ADAPTER, Interest::READABLE | Interest::WRITABLE)
         .map_err(LinkError::System)?;
-    let mut port = ClientPort {
-        endpoint: endpoint.to_string(),
-        peer,
-        watch,
-        stream,
-        is_unread: true,
-        decoder: AnswerDecoder::default(),
-        output: Output::default(),
-        commands: VecDeque::new(),
-        opened: Instant::now(),
-        unanswered: VecDeque::new(),
-        answers: false,
-        refusals_told: 0,
-        was_garbled: false,
-        inbox: VecDeque::new(),
-        end: None,
-    };
-    let bit_rate = match rate {
-        BitRate::Kbit125 => "S4",
-        BitRate::Kbit250 => "S5",
-        BitRate::Kbit500 => "S6",
-    };
-    for command in ["C", bit_rate, "O"] {
-        port.output.push(Line::short(format!("{command}\r").as_bytes()));
-        port.commands.push_back(command);
-    }
-    port.flush();
-    Ok(port)
+    Ok(ClientPort::new(format!("slcan:{endpoint}"), stream, watch, rate))
 }
+
+/// What leads to an adapter. Reading and writing do not wait.
+pub(crate) trait Stream: Read + Write + Send + fmt::Debug {}
+
+impl<S: Read + Write + Send + fmt::Debug> Stream for S {}
 
 /// A channel of somebody else's adapter.
 ///
@@ -76,12 +58,12 @@ pub(crate) fn connect(endpoint: &Endpoint, rate: BitRate) -> Result<ClientPort, 
 /// with the first answer to a frame: before it nothing is confirmed, after it one frame is on its
 /// way at a time, so that the next is built when it can go.
 #[derive(Debug)]
-pub(crate) struct ClientPort {
-    endpoint: String,
-    peer: SocketAddr,
+pub(crate) struct ClientPort<S: Stream> {
+    /// The adapter as a bus URI.
+    bus: String,
     watch: Watch,
-    stream: TcpStream,
-    /// The socket may hold more: it tells once, and not again before it was read to its end.
+    stream: S,
+    /// The stream may hold more: it tells once, and not again before it was read to its end.
     is_unread: bool,
     decoder: AnswerDecoder,
     output: Output<Line>,
@@ -114,15 +96,54 @@ enum End {
 }
 
 impl End {
-    fn error(&self, peer: SocketAddr) -> LinkError {
+    fn error(&self, bus: &str) -> LinkError {
+        let bus = bus.to_owned();
         match self {
-            Self::Refused => LinkError::Refused { peer },
-            Self::Lost(reason) => LinkError::Lost { peer, reason: reason.clone() },
+            Self::Refused => LinkError::Refused { bus },
+            Self::Lost(reason) => LinkError::Lost { bus, reason: reason.clone() },
         }
     }
 }
 
-impl ClientPort {
+impl<S: Stream> ClientPort<S> {
+    /// A port to the adapter behind `stream`, which `watch` watches as [`ADAPTER`]; asks it to open
+    /// its channel at `rate`.
+    pub(super) fn new(bus: String, stream: S, watch: Watch, rate: BitRate) -> Self {
+        let mut port = Self {
+            bus,
+            watch,
+            stream,
+            is_unread: true,
+            decoder: AnswerDecoder::default(),
+            output: Output::default(),
+            commands: VecDeque::new(),
+            opened: Instant::now(),
+            unanswered: VecDeque::new(),
+            answers: false,
+            refusals_told: 0,
+            was_garbled: false,
+            inbox: VecDeque::new(),
+            end: None,
+        };
+        let bit_rate = match rate {
+            BitRate::Kbit125 => "S4",
+            BitRate::Kbit250 => "S5",
+            BitRate::Kbit500 => "S6",
+        };
+        for command in ["C", bit_rate, "O"] {
+            port.output.push(Line::short(format!("{command}\r").as_bytes()));
+            port.commands.push_back(command);
+        }
+        port.flush();
+        port
+    }
+
+    /// Has people hear of `notices` first.
+    pub(super) fn telling(mut self, notices: impl IntoIterator<Item = Notice>) -> Self {
+        self.inbox.extend(notices.into_iter().map(Received::Notice));
+        self
+    }
+
     /// Reads one piece and takes in what it says.
     fn read(&mut self) {
         let mut buffer = [0; PIECE];
@@ -137,7 +158,7 @@ impl ClientPort {
             }
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => self.is_unread = false,
-            Err(error) => self.lose(lost_phrase(&error)),
+            Err(error) => self.lose(phrase(&error)),
         }
     }
 
@@ -230,7 +251,7 @@ impl ClientPort {
 
     fn flush(&mut self) {
         if let Err(error) = self.output.flush(&mut self.stream) {
-            self.lose(lost_phrase(&error));
+            self.lose(phrase(&error));
         }
     }
 
@@ -244,7 +265,7 @@ impl ClientPort {
     }
 }
 
-impl CanPort for ClientPort {
+impl<S: Stream> CanPort for ClientPort<S> {
     fn is_ready(&self) -> bool {
         let has_room = !self.answers || self.unanswered.is_empty();
         self.end.is_none() && self.output.is_empty() && has_room
@@ -252,7 +273,7 @@ impl CanPort for ClientPort {
 
     fn send(&mut self, frame: &Frame) -> Result<bool, LinkError> {
         if let Some(end) = &self.end {
-            return Err(end.error(self.peer));
+            return Err(end.error(&self.bus));
         }
         if !self.is_ready() {
             return Ok(false);
@@ -276,7 +297,7 @@ impl CanPort for ClientPort {
                 return Ok(Some(received));
             }
             if let Some(end) = &self.end {
-                return Err(end.error(self.peer));
+                return Err(end.error(&self.bus));
             }
             let answer =
                 self.answer_limit().map(|limit| limit.saturating_duration_since(Instant::now()));
@@ -317,11 +338,11 @@ impl CanPort for ClientPort {
     }
 
     fn describe(&self) -> String {
-        format!("slcan:{}", self.endpoint)
+        self.bus.clone()
     }
 }
 
-impl Drop for ClientPort {
+impl<S: Stream> Drop for ClientPort<S> {
     /// Closes the channel, so that an adapter of metal does not go on acknowledging frames that
     /// nobody reads.
     fn drop(&mut self) {

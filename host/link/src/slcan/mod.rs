@@ -12,7 +12,10 @@ mod channel;
 mod client;
 mod command;
 mod line;
-mod listen;
+#[cfg(unix)]
+mod pty;
+#[cfg(unix)]
+mod serial;
 
 pub use answer::{Answer, AnswerDecoder};
 pub use channel::{Channel, Effect};
@@ -20,4 +23,7 @@ pub use command::{Command, CommandDecoder, Malformed};
 pub use line::Line;
 
 pub(crate) use client::connect;
-pub(crate) use listen::listen;
+#[cfg(unix)]
+pub(crate) use pty::listen as listen_pty;
+#[cfg(unix)]
+pub(crate) use serial::open as open_serial;

@@ -122,6 +122,14 @@ impl Client {
         assert_eq!(buffer.escape_ascii().to_string(), octets.as_bytes().escape_ascii().to_string());
     }
 
+    /// Reads to `end`, and that too.
+    pub(crate) fn skip_to(&mut self, end: u8) {
+        let mut octet = [0];
+        while octet != [end] {
+            self.stream.read_exact(&mut octet).unwrap();
+        }
+    }
+
     pub(crate) fn expect_nothing(&mut self) {
         self.stream.set_read_timeout(Some(Duration::from_millis(30))).unwrap();
         let mut buffer = [0; 64];

@@ -181,9 +181,29 @@ impl Client {
         assert_eq!(hex(&self.heard), "");
     }
 
-    /// Why the line ends, which it does in time.
-    pub(crate) fn expect_end(&mut self) -> String {
-        self.listen(usize::MAX, PATIENCE).expect_err("the line goes on").to_string()
+    /// Why the line is lost, which it is in time.
+    pub(crate) fn expect_loss(&mut self) -> String {
+        self.expect_notice(|notice| match notice {
+            Notice::BusLost { .. } => Some(notice.to_string()),
+            _ => None,
+        })
+    }
+
+    /// The first notice that `wanted` knows; panics when none comes in time.
+    pub(crate) fn expect_notice<T>(&mut self, wanted: impl Fn(&Notice) -> Option<T>) -> T {
+        let start = Instant::now();
+        while start.elapsed() < PATIENCE {
+            if let Some(found) = self.notices.drain(..).find_map(|notice| wanted(&notice)) {
+                return found;
+            }
+            match self.port.receive(Some(PATIENCE)).unwrap() {
+                Some(Rs485Received::Notice(notice)) => self.notices.push(notice),
+                Some(Rs485Received::Octets(octets)) => self.heard.extend(octets),
+                Some(other) => panic!("{other:?} on a line of octets"),
+                None => {}
+            }
+        }
+        panic!("nothing was told");
     }
 
     /// Asks until the slave answers, so that it is known to have this client on the line.

@@ -13,7 +13,17 @@ fn refusal(uri: &str) -> String {
 fn a_bus_of_another_kind_is_answered_with_the_forms_of_this_one() {
     const RS485: &str = "rs485-listen:HOST:PORT, rs485-listen:pty:PATH, rs485:HOST:PORT or \
                          rs485:/dev/tty… for RS-485";
-    for uri in ["virtual:lab", "slcan:127.0.0.1:4001", "slcan-listen:127.0.0.1:0"] {
+    const CAN: &str = "socketcan:can0, slcan:/dev/tty…, slcan:HOST:PORT, slcan-listen:HOST:PORT, \
+                       slcan-listen:pty:PATH or socketcand-listen:HOST:PORT for CAN";
+    for uri in [
+        "virtual:lab",
+        "slcan:127.0.0.1:4001",
+        "slcan-listen:127.0.0.1:0",
+        "slcan:/dev/ttyACM0",
+        "slcan-listen:pty:./a",
+        "socketcan:can0",
+        "socketcand-listen:127.0.0.1:0",
+    ] {
         let expected = format!("{uri} is no RS-485 bus to connect to: write {RS485}");
         assert_eq!(refusal(uri), expected);
     }
@@ -25,10 +35,7 @@ fn a_bus_of_another_kind_is_answered_with_the_forms_of_this_one() {
     ] {
         assert_eq!(
             open(&uri.parse().unwrap(), BitRate::Kbit125).err().unwrap().to_string(),
-            format!(
-                "{uri} is no CAN bus to connect to: write slcan-listen:HOST:PORT or slcan:HOST:PORT \
-                 for CAN"
-            )
+            format!("{uri} is no CAN bus to connect to: write {CAN}")
         );
     }
 }

@@ -1,14 +1,15 @@
-//! `slcan-listen:HOST:PORT`: we play the adapter, for any number of clients.
+//! A CAN segment made of software: what one of its guests says, the station and all other guests
+//! hear. What the guests speak is the affair of their language.
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::net::SocketAddr;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use codewheel_station::can::{BitRate, Frame};
 
-use super::channel::{Channel, Effect};
-use super::line::Line;
 use crate::clients::{Clients, OCTETS_PER_TURN};
+use crate::output::Portion;
 use crate::socket::Limit;
 use crate::{CanPort, Endpoint, LinkError, Notice, Received, Waker};
 
@@ -18,33 +19,91 @@ const OPENINGS_TOLD: u8 = 4;
 /// Reports kept for a station that only sends and never receives.
 const REPORTS: usize = 4096;
 
+/// What a guest's words lead to, in the order in which it must be done. `W` is what is said to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect<W> {
+    /// Write this to the client.
+    Answer(W),
+    /// Put this on the bus.
+    Transmit(Frame),
+    /// The client takes part from now on.
+    Opened {
+        /// Whether it can only listen.
+        listen_only: bool,
+        /// The bit rate it chose, in bits per second; `None` when it joins at the segment's.
+        bit_rate: Option<u32>,
+    },
+    /// The client no longer takes part.
+    Closed,
+}
+
+/// When a frame was on the segment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment {
+    /// Milliseconds since the segment is there.
+    pub(crate) milliseconds: u64,
+    /// Since the beginning of 1970, UTC.
+    pub(crate) since_1970: Duration,
+}
+
+/// One guest of the segment: what it speaks, and how far it has come. Does no I/O.
+pub(crate) trait Guest: Default + Send + fmt::Debug {
+    /// What is said to it, a whole line or word at a time.
+    type Word: Portion + Send + fmt::Debug;
+    /// How its segment is called in a bus URI, as `slcan-listen`.
+    const KIND: &'static str;
+
+    /// What it is greeted with.
+    fn greeting() -> Option<Self::Word> {
+        None
+    }
+
+    /// Takes octets of the guest, in pieces of any size, and tells `effect` what to do.
+    fn hear(&mut self, octets: &[u8], effect: impl FnMut(Effect<Self::Word>));
+
+    /// What brings a frame of the bus to the guest, or `None` while it takes no part.
+    fn tell(&mut self, frame: &Frame, at: Moment) -> Option<Self::Word>;
+}
+
 /// Binds `endpoint` and serves a segment at `rate`.
-pub(crate) fn listen(endpoint: &Endpoint, rate: BitRate) -> Result<ListenPort, LinkError> {
+pub(crate) fn listen<G: Guest>(
+    endpoint: &Endpoint,
+    rate: BitRate,
+) -> Result<ListenPort<G>, LinkError> {
     Ok(ListenPort {
         rate,
         started: Instant::now(),
-        clients: Clients::listen(endpoint)?,
+        clients: Clients::listen(endpoint, G::greeting)?,
         inbox: VecDeque::new(),
     })
 }
 
 /// A bus whose wire is this object: what one takes part with, all others hear, in one order.
 #[derive(Debug)]
-pub(crate) struct ListenPort {
+pub(crate) struct ListenPort<G: Guest> {
     rate: BitRate,
     started: Instant,
-    clients: Clients<Membership, Line>,
+    clients: Clients<Membership<G>, G::Word>,
     inbox: VecDeque<Received>,
 }
 
 /// What a client is to the bus.
 #[derive(Debug, Default)]
-struct Membership {
-    channel: Channel,
+struct Membership<G> {
+    guest: G,
     openings_told: u8,
 }
 
-impl ListenPort {
+/// The time now, for a segment that is there since `started`.
+pub(crate) fn moment(started: Instant) -> Moment {
+    Moment {
+        milliseconds: started.elapsed().as_millis() as u64,
+        // A clock that was never set is no reason to say nothing.
+        since_1970: SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default(),
+    }
+}
+
+impl<G: Guest> ListenPort<G> {
     /// Reads a piece from every client that has something, once around.
     fn serve(&mut self) {
         for _ in 0..self.clients.unread() {
@@ -59,12 +118,12 @@ impl ListenPort {
     fn hear(&mut self, token: usize, octets: &[u8]) {
         let Some(client) = self.clients.get_mut(token) else { return };
         let mut effects = Vec::new();
-        client.state.channel.receive(octets, |effect| effects.push(effect));
+        client.state.guest.hear(octets, |effect| effects.push(effect));
         for effect in effects {
             match effect {
-                Effect::Answer(line) => {
+                Effect::Answer(word) => {
                     if let Some(client) = self.clients.get_mut(token) {
-                        client.output.push(line);
+                        client.output.push(word);
                     }
                 }
                 Effect::Transmit(frame) => {
@@ -88,16 +147,16 @@ impl ListenPort {
         let (client, segment) = (client.address, self.rate);
         self.tell(Notice::ClientOpened { client, listen_only });
         if let Some(chosen) = bit_rate.filter(|chosen| *chosen != segment.bits_per_second()) {
-            self.tell(Notice::OtherBitRate { client, chosen, segment });
+            self.tell(Notice::OtherBitRate { client: client.to_string(), chosen, segment });
         }
     }
 
     /// Brings a frame to all open clients but the one it comes from.
     fn broadcast(&mut self, frame: &Frame, from: Option<usize>) {
-        let milliseconds = self.started.elapsed().as_millis() as u64;
+        let moment = moment(self.started);
         for client in self.clients.others(from) {
-            let Some(line) = client.state.channel.deliver(frame, milliseconds) else { continue };
-            if client.output.push(line) {
+            let Some(word) = client.state.guest.tell(frame, moment) else { continue };
+            if client.output.push(word) {
                 let notice = Notice::ClientTooSlow { client: client.address };
                 self.inbox.push_back(Received::Notice(notice));
             }
@@ -116,7 +175,7 @@ impl ListenPort {
     }
 }
 
-impl CanPort for ListenPort {
+impl<G: Guest> CanPort for ListenPort<G> {
     fn is_ready(&self) -> bool {
         self.inbox.len() < REPORTS
     }
@@ -156,7 +215,7 @@ impl CanPort for ListenPort {
         self.clients.waker()
     }
 
-    /// The adapter acknowledges each frame itself, clients or none.
+    /// The segment acknowledges each frame itself, clients or none.
     fn confirms(&self) -> bool {
         true
     }
@@ -166,6 +225,6 @@ impl CanPort for ListenPort {
     }
 
     fn describe(&self) -> String {
-        format!("slcan-listen:{}", self.clients.address())
+        format!("{}:{}", G::KIND, self.clients.address())
     }
 }
