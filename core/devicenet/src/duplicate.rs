@@ -61,6 +61,8 @@ pub enum Fault {
     DuplicateMac,
     /// The controller left the bus after too many errors.
     BusOff,
+    /// Nothing leads to the network.
+    Detached,
     /// The switches give no address of a DeviceNet node.
     Switches,
 }

@@ -51,6 +51,7 @@ impl fmt::Display for Event {
             Self::Faulted(Fault::DuplicateMac) => {
                 f.write_str("another node has this MAC ID: silent until the next power cycle")
             }
+            Self::Faulted(Fault::Detached) => f.write_str("off the network"),
             Self::Faulted(Fault::BusOff) => f.write_str("bus-off: silent"),
             Self::Faulted(Fault::Switches) => {
                 f.write_str("the address switches give no DeviceNet address: silent")

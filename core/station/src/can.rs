@@ -173,6 +173,12 @@ pub enum Input<'a> {
     BusOff,
     /// The controller takes part again after a bus-off.
     Recovered,
+    /// Nothing leads to the network any more: the plug is out, the adapter or the interface is gone.
+    /// What was handed over is gone.
+    Detached,
+    /// The network is there again after [`Detached`](Self::Detached), with a controller that was
+    /// started anew.
+    Attached,
 }
 
 /// An acceptance filter for standard identifiers: a frame is taken when

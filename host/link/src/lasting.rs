@@ -284,11 +284,11 @@ impl Port for dyn CanPort {
     }
 
     fn lost() -> Option<Received> {
-        Some(Received::BusOff)
+        Some(Received::Detached)
     }
 
     fn back() -> Option<Received> {
-        Some(Received::Recovered)
+        Some(Received::Attached)
     }
 }
 

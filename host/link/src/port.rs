@@ -65,10 +65,14 @@ pub enum Received {
     Frame(Frame),
     /// Our frame went out and another node acknowledged it.
     Sent(Frame),
-    /// The controller left the bus, or what leads to it is lost; what was handed over is gone.
+    /// The controller left the bus; what was handed to it is gone.
     BusOff,
-    /// The controller takes part again, or the bus is there again.
+    /// The controller takes part again.
     Recovered,
+    /// What leads to the bus is lost; what was handed over is gone.
+    Detached,
+    /// The bus is there again.
+    Attached,
     /// Something for people.
     Notice(Notice),
     /// A [`Waker`] of this port was used since the last report of this kind.
@@ -106,7 +110,7 @@ impl fmt::Debug for Waker {
 ///
 /// Takes at most 5 s (`slcan:HOST:PORT`, when nobody answers); the other kinds do not wait. An
 /// adapter, a connection or an interface that is lost later is sought until it is back. The station
-/// hears [`Received::BusOff`] and [`Received::Recovered`], people [`Notice::BusLost`] and
+/// hears [`Received::Detached`] and [`Received::Attached`], people [`Notice::BusLost`] and
 /// [`Notice::BusBack`]; meanwhile the port takes nothing.
 ///
 /// # Errors

@@ -205,6 +205,12 @@ impl Loop {
                 station.handle(now, can::Input::BusOff);
             }
             Received::Recovered => station.handle(now, can::Input::Recovered),
+            Received::Detached => {
+                self.handed_over.clear();
+                self.left_over = None;
+                station.handle(now, can::Input::Detached);
+            }
+            Received::Attached => station.handle(now, can::Input::Attached),
             Received::Notice(notice) => outcome.notices.push(notice),
             Received::Woken => outcome.woken = true,
         }

@@ -24,7 +24,7 @@ fn lost(listener: TcpListener, uri: &str) -> (Box<dyn CanPort>, SocketAddr) {
     drop((listener.accept().unwrap(), listener));
     let notice = told(port.as_mut());
     assert!(matches!(notice, Notice::BusLost { bus, .. } if bus == uri));
-    assert_eq!(port.receive(Some(PATIENCE)).unwrap(), Some(Received::BusOff));
+    assert_eq!(port.receive(Some(PATIENCE)).unwrap(), Some(Received::Detached));
     (port, address)
 }
 
@@ -46,7 +46,7 @@ fn an_adapter_that_comes_back_is_opened_again_at_the_same_rate() {
     assert_eq!(told(port.as_mut()), Notice::BusBack { bus: uri });
     assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
     assert!(!port.is_ready(), "the station has yet to hear that it was away");
-    assert_eq!(port.receive(Some(PATIENCE)).unwrap(), Some(Received::Recovered));
+    assert_eq!(port.receive(Some(PATIENCE)).unwrap(), Some(Received::Attached));
     let mut peer = Client::new(listener.accept().unwrap().0);
     peer.expect("C\rS4\rO\r");
     peer.say("\x07\r\rt42D0\r");
@@ -104,7 +104,7 @@ fn a_waker_wakes_before_while_and_after_the_adapter_is_gone() {
     assert_eq!(port.receive(None).unwrap(), Some(Received::Woken));
     drop((peer, listener));
     assert!(matches!(told(port.as_mut()), Notice::BusLost { .. }));
-    assert_eq!(port.receive(None).unwrap(), Some(Received::BusOff));
+    assert_eq!(port.receive(None).unwrap(), Some(Received::Detached));
     let late = waker.clone();
     let thread = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(50));
@@ -114,7 +114,7 @@ fn a_waker_wakes_before_while_and_after_the_adapter_is_gone() {
     thread.join().unwrap();
     let _listener = TcpListener::bind(address).unwrap();
     assert!(matches!(told(port.as_mut()), Notice::BusBack { .. }));
-    assert_eq!(port.receive(None).unwrap(), Some(Received::Recovered));
+    assert_eq!(port.receive(None).unwrap(), Some(Received::Attached));
     waker.wake();
     assert_eq!(port.receive(None).unwrap(), Some(Received::Woken));
     assert_eq!(port.receive(Some(Duration::from_millis(20))).unwrap(), None, "woken once");
@@ -156,11 +156,11 @@ fn an_adapter_that_refuses_is_an_error_at_the_start_and_patience_later() {
     let mut port = open(&uri.parse().unwrap(), BitRate::Kbit125).unwrap();
     drop(listener.accept().unwrap());
     assert!(matches!(told(port.as_mut()), Notice::BusLost { .. }));
-    assert_eq!(port.receive(None).unwrap(), Some(Received::BusOff));
+    assert_eq!(port.receive(None).unwrap(), Some(Received::Detached));
     assert!(matches!(told(port.as_mut()), Notice::BusBack { .. }));
     let mut peer = Client::new(listener.accept().unwrap().0);
     peer.say("\r\r\x07");
-    assert_eq!(port.receive(None).unwrap(), Some(Received::Recovered));
+    assert_eq!(port.receive(None).unwrap(), Some(Received::Attached));
     match told(port.as_mut()) {
         Notice::BusLost { reason, .. } => assert!(reason.contains("refused"), "{reason}"),
         other => panic!("{other}"),
@@ -187,14 +187,14 @@ fn a_serial_adapter_that_is_plugged_in_again_is_opened_again() {
     drop(far);
     std::fs::remove_file(&path).unwrap();
     assert!(matches!(told(port.as_mut()), Notice::BusLost { .. }));
-    assert_eq!(port.receive(None).unwrap(), Some(Received::BusOff));
+    assert_eq!(port.receive(None).unwrap(), Some(Received::Detached));
     match told(port.as_mut()) {
         Notice::BusStillLost { reason } => assert!(reason.contains("plug the adapter in")),
         other => panic!("{other}"),
     }
     let mut far = plug();
     assert_eq!(told(port.as_mut()), Notice::BusBack { bus: uri });
-    assert_eq!(port.receive(None).unwrap(), Some(Received::Recovered));
+    assert_eq!(port.receive(None).unwrap(), Some(Received::Attached));
     let mut octets = [0; 7];
     far.read_exact(&mut octets).unwrap();
     assert_eq!(&octets, b"C\rS5\rO\r");

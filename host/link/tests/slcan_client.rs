@@ -171,7 +171,7 @@ fn a_lost_connection_is_said_after_what_had_arrived() {
     let reason = "the other side closed it".to_owned();
     let lost = port.receive(Some(PATIENCE)).unwrap();
     assert_eq!(lost, Some(Received::Notice(Notice::BusLost { bus: uri, reason })));
-    assert_eq!(next(port.as_mut()), Received::BusOff);
+    assert_eq!(next(port.as_mut()), Received::Detached);
 }
 
 #[test]

@@ -96,7 +96,7 @@ fn an_adapter_that_is_pulled_out_is_told_and_the_station_is_off_the_bus() {
         Some(Received::Notice(Notice::BusLost { bus, .. })) => assert_eq!(bus, port.describe()),
         other => panic!("{other:?}"),
     }
-    assert_eq!(port.receive(Some(PATIENCE)).unwrap(), Some(Received::BusOff));
+    assert_eq!(port.receive(Some(PATIENCE)).unwrap(), Some(Received::Detached));
     assert!(!port.is_ready());
     assert!(!port.send(&Frame::standard(1, &[])).unwrap());
 }

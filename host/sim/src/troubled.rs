@@ -42,7 +42,7 @@ where
     }
 
     fn is_cut_off(input: &can::Input<'_>) -> bool {
-        *input == can::Input::BusOff
+        matches!(input, can::Input::BusOff | can::Input::Detached)
     }
 }
 

@@ -169,6 +169,18 @@ impl<const SLAVES: usize> Station for Scanner<SLAVES> {
                     self.network = DuplicateMacCheck::begin(self.mac);
                 }
             }
+            can::Input::Detached => {
+                let was_silent = self.network.faulted().is_some();
+                self.network.fault(Fault::Detached);
+                if !was_silent {
+                    self.leave_all();
+                }
+            }
+            can::Input::Attached => {
+                if self.network.faulted() == Some(Fault::Detached) {
+                    self.network = DuplicateMacCheck::begin(self.mac);
+                }
+            }
         }
         if self.network.is_on_line() {
             self.cycle.advance(now);

@@ -193,6 +193,8 @@ impl Server {
             can::Input::Sent(frame) => self.sent(now, frame),
             can::Input::BusOff => self.bus_off(now, app),
             can::Input::Recovered => self.recovered(),
+            can::Input::Detached => self.fall_silent(now, Fault::Detached, app),
+            can::Input::Attached => self.attached(),
         }
         self.look_for_changes(now, app);
     }
@@ -251,6 +253,14 @@ impl Server {
     /// With bus-off interrupt 1 the node checks its MAC ID anew. Other faults outlast a recovery.
     fn recovered(&mut self) {
         if self.settings.bus_off_interrupt && self.network.faulted() == Some(Fault::BusOff) {
+            self.network = DuplicateMacCheck::begin(self.mac);
+        }
+    }
+
+    /// A node whose plug is in again starts as at power-up, whatever BOI says: nobody on the network
+    /// knows it any more, and its address may be taken. A duplicate MAC ID stays one.
+    fn attached(&mut self) {
+        if self.network.faulted() == Some(Fault::Detached) {
             self.network = DuplicateMacCheck::begin(self.mac);
         }
     }

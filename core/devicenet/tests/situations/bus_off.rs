@@ -159,3 +159,42 @@ fn a_fragmented_answer_is_not_taken_up_again_after_a_recovery() {
     bench.node.handle(bench.now, Input::Frame(&frame("42C#8AC000")));
     assert_eq!(bench.wait(Duration::from_secs(5)), [""; 0]);
 }
+
+#[test]
+fn a_node_that_is_plugged_in_again_checks_its_mac_id_whatever_the_interrupt_says() {
+    for interrupt in ["10 03 01 03 00", "10 03 01 03 01"] {
+        let mut bench = Bench::polled();
+        bench.asks(interrupt, "90");
+        bench.node.handle(bench.now, Input::Detached);
+        assert_eq!(bench.node.server.status(), NetworkStatus::Faulted(Fault::Detached));
+        assert_eq!(bench.wait(Duration::from_secs(100)), [""; 0]);
+        bench.node.handle(bench.now, Input::Attached);
+        assert_eq!(bench.collect(), [CHECK]);
+        assert_eq!(bench.wait(Duration::from_millis(1_000)), [CHECK]);
+        bench.wait(Duration::from_millis(1_000));
+        assert_eq!(bench.node.server.status(), NetworkStatus::OnLine);
+        bench.says("42D#", &[]);
+        bench.says("42E#0A4B0301030A", &["42B#0ACB00"]);
+        // It was no bus-off.
+        bench.asks("0E 03 01 04", "8E 00");
+    }
+}
+
+#[test]
+fn a_bus_off_that_was_for_good_ends_with_the_plug() {
+    let mut bench = Bench::polled();
+    leaves_the_bus(&mut bench);
+    bench.node.handle(bench.now, Input::Detached);
+    bench.node.handle(bench.now, Input::Attached);
+    assert_eq!(bench.collect(), [CHECK]);
+}
+
+#[test]
+fn a_duplicate_mac_id_outlasts_the_plug() {
+    let mut bench = Bench::polled();
+    bench.says("42F#80341278563412", &[]);
+    bench.node.handle(bench.now, Input::Detached);
+    bench.node.handle(bench.now, Input::Attached);
+    assert_eq!(bench.node.server.status(), NetworkStatus::Faulted(Fault::DuplicateMac));
+    assert_eq!(bench.wait(Duration::from_secs(10)), [""; 0]);
+}

@@ -37,7 +37,7 @@ impl Station for Echo {
                 }
             }
             can::Input::Sent(frame) => self.sent.push(*frame),
-            can::Input::BusOff | can::Input::Recovered => {}
+            _ => {}
         }
     }
 

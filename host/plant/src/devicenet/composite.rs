@@ -96,6 +96,16 @@ impl<S: Node> Station for Composite<S> {
             Input::Frame(_) | Input::Recovered => {
                 self.present().for_each(|(_, seat)| seat.station.handle(now, input));
             }
+            Input::Attached => {
+                self.seats.iter_mut().for_each(|(_, seat)| seat.station.handle(now, input));
+            }
+            Input::Detached => {
+                self.on_the_way.clear();
+                for (_, seat) in self.seats.iter_mut() {
+                    seat.mailbox = None;
+                    seat.station.handle(now, input);
+                }
+            }
             Input::BusOff => {
                 self.on_the_way.clear();
                 for (_, seat) in self.present() {

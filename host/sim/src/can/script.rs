@@ -64,7 +64,7 @@ impl Station for Script {
         match input {
             Input::Frame(frame) => self.received.push((now, *frame)),
             Input::Sent(frame) => self.sent.push((now, *frame)),
-            Input::BusOff | Input::Recovered => {}
+            Input::BusOff | Input::Recovered | Input::Detached | Input::Attached => {}
         }
     }
 
