@@ -1,0 +1,84 @@
+//! Naming what frames and telegrams say.
+
+mod devicenet;
+mod line;
+mod profibus;
+mod replay;
+
+use self::devicenet::DeviceNet;
+use self::line::Line;
+use self::profibus::Profibus;
+use crate::{Bus, Condition, Content, Record};
+
+pub use self::replay::{Replayed, replay};
+
+/// What a decoder writes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Output {
+    /// A line for people.
+    #[default]
+    Text,
+    /// A JSON object, in one line.
+    Json,
+}
+
+/// What stations are taken for that have not yet said what they are.
+///
+/// A PROFIBUS slave says it with its ident number (Slave_Diag, Set_Prm), a DeviceNet node with its
+/// vendor (duplicate MAC ID check, Identity object). Once it has, it is one of our encoders or it is not,
+/// and what is not has its positions, parameters and diagnoses shown as octets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Assume {
+    /// For encoders: a recording that begins in the middle shows positions.
+    #[default]
+    Encoders,
+    /// For nothing in particular.
+    Nothing,
+}
+
+/// Names what the records of a capture say, one line each; also live, as they come.
+///
+/// It remembers what answers do not repeat: the request of a response, the fragments of a message, the
+/// ident number of a slave. So it wants all records of a bus in their order.
+#[derive(Debug)]
+pub struct Decoder {
+    output: Output,
+    assume: Assume,
+    buses: Vec<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    devicenet: Option<Box<DeviceNet>>,
+    profibus: Option<Box<Profibus>>,
+}
+
+impl Decoder {
+    /// A decoder that has seen nothing yet.
+    #[must_use]
+    pub const fn new(output: Output, assume: Assume) -> Self {
+        Self { output, assume, buses: Vec::new() }
+    }
+
+    /// Appends the line of `record`, which was carried by `bus`, with its end of line.
+    pub fn decode(&mut self, bus: &Bus, record: &Record<'_>, out: &mut Vec<u8>) {
+        let place = usize::from(record.bus);
+        if self.buses.len() <= place {
+            self.buses.resize_with(place + 1, State::default);
+        }
+        let Some(state) = self.buses.get_mut(place) else { return };
+        let assume = self.assume;
+        let mut line = Line::begin(out, self.output, bus, record);
+        match &record.content {
+            Content::Frame(frame) => {
+                let known = state.devicenet.get_or_insert_with(|| Box::new(DeviceNet::new(assume)));
+                known.decode(frame, &mut line);
+            }
+            Content::Telegram { octets, condition } => {
+                let known = state.profibus.get_or_insert_with(|| Box::new(Profibus::new(assume)));
+                known.decode(octets, *condition == Condition::Broken, &mut line);
+            }
+        }
+        line.end(&record.content);
+    }
+}
