@@ -13,7 +13,8 @@ export PATH="$PATH:$HOME/.cargo/bin"
 
 CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 export CARGO_TARGET_DIR
-steps=(fmt clippy doc test requests segments no-std bench-builds fuzz-builds deny strangers)
+steps=(fmt clippy doc test requests segments telegrams no-std bench-builds fuzz-builds deny
+    strangers socketcan)
 
 explain() {
     case $1 in
@@ -23,11 +24,13 @@ explain() {
     test) echo "all tests, walls.rs with the import table among them" ;;
     requests) echo "two million requests from a seed: one answer each, and a refusal changes nothing" ;;
     segments) echo "63 encoders and a scanner with losses and power cuts, 20 seeds" ;;
+    telegrams) echo "every bit flip of a PROFIBUS telegram, and every FC and SAP in every state" ;;
     no-std) echo "core links without allocator and std, on the host and for Cortex-M0 (proofs/no-std)" ;;
     bench-builds) echo "the benchmarks build" ;;
     fuzz-builds) echo "the fuzz targets build (fuzz/); their corpus runs in test" ;;
     deny) echo "licences, sources and bans of every dependency (cargo deny, deny.toml)" ;;
-    strangers) echo "masters that are not ours, written from the manuals or by others (strangers/)" ;;
+    strangers) echo "masters and parsers that are not ours, or know the manuals alone (strangers/)" ;;
+    socketcan) echo "can-utils, on a Linux kernel with emulated controllers, joins us (strangers/)" ;;
     esac
 }
 
@@ -56,6 +59,11 @@ step_requests() {
 step_segments() {
     CODEWHEEL_NODES=63 \
         cargo test --release --locked --package codewheel-device --test segments lost_frames
+}
+
+step_telegrams() {
+    CODEWHEEL_EXHAUSTIVE=1 \
+        cargo test --release --locked --package codewheel-profibus --test exhaustive
 }
 
 step_no-std() {
@@ -97,6 +105,8 @@ step_strangers() {
     "$python" strangers/devicenet_master_test.py
     "$python" strangers/profibus_book_test.py
     "$python" strangers/tshark_judges.py --self-test
+    "$python" strangers/data_sheets.py --self-test host/datasheet/tests/golden
+    "$python" strangers/data_sheets.py host/datasheet/tests/golden
     # Walks mostly wait for the encoder's clock, so they go side by side.
     # Not local, since the trap outlives this function.
     pids=()
@@ -111,6 +121,7 @@ step_strangers() {
     walk profibus-settings profibus_chapters.py --part parameters data
     walk profibus-diagnosis profibus_chapters.py --part diagnosis
     walk pyprofibus pyprofibus_session.py
+    walk python-can-links python_can_links.py
     local at failed=()
     for at in "${!pids[@]}"; do
         if wait "${pids[at]}"; then
@@ -127,6 +138,15 @@ step_strangers() {
     fi
     "$python" strangers/tshark_judges.py session "$logs/session.log"
     "$python" strangers/tshark_judges.py chapters "$logs"/{modes,resting,objects}.log
+    cargo run --quiet --package codewheel-capture --locked --example make_samples -- \
+        "$logs/captures"
+    "$python" strangers/captures.py "$logs/captures"
+}
+
+# Installs what it needs by itself.
+step_socketcan() {
+    cargo build --package codewheel --locked
+    strangers/socketcan_session.sh "$CARGO_TARGET_DIR/debug/codewheel"
 }
 
 # Starts the walk $2… of `step_strangers`, called $1, which writes $logs/$1.log and $logs/$1.out.

@@ -1,7 +1,7 @@
 //! `.pcapng` of Wireshark (IETF draft-ietf-opsawg-pcapng): one interface a bus.
 //!
-//! The few blocks are read and written here: the crate for it had its last release in 2022, and gives
-//! neither the place of a damage nor what stood before it.
+//! The few blocks are read and written here: where a file is damaged, its reader must say at which
+//! octet, and give what stood before.
 
 use std::io::{self, BufRead, Read};
 
