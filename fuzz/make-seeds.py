@@ -90,6 +90,8 @@ DEVICE = {
     "release": D29 + allocate(3) + frame(6, "0A4C030103") + frame(6, "0B4B0301030B"),
     "stranger": D29 + allocate(1) + frame(6, "0B4B0301030B") + frame(4, "0B0E010101"),
     "bus-off": D29 + allocate(1) + ask("1003010301") + TAKEN + b"\x88" + wait(100) + b"\x89" + allocate(1),
+    "plug-out-and-in": D29 + allocate(3) + POLL + b"\x8E" + wait(3000) + b"\x8F" + allocate(3) + POLL,
+    "plug-out-after-bus-off": D29 + allocate(1) + b"\x88\x8E\x8F" + allocate(1),
     "heartbeat": D29 + allocate(1) + ask("1001010A01") + TAKEN + wait(3500),
     "held-medium": D29 + allocate(3) + POLL + HOLD + frame(5) * 2 + ask("0E010101") + wait(20) + HOLD,
     "switches-at-70": b"\x01\x46" + ON_LINE + b"\x8C\x05" + power_cut(0) + allocate(1),
@@ -189,6 +191,132 @@ for name, octets in {
     "pauses": b"\x0F\x0A" + SCANNER_ON_LINE + configured(0) + (responses(0) + b"\x88\x0A\x00") * 5,
 }.items():
     write("scanner", name, octets)
+
+# --- the PROFIBUS encoder: slave 7, masters 2 and 3 -------------------------------------------------
+
+def slave(product=1, link=6):
+    """AMG 11 P 29 at 1.5 Mbit/s where the link counts bits."""
+    return bytes([product, link])
+
+
+def asks(service, text=""):
+    """0 Data_Exchange, 1 Slave_Diag, 2 Get_Cfg, 3 Set_Prm, 4 Chk_Cfg, 5 RD_Inp, 6 RD_Outp, 7 Global_Control."""
+    data = bytes.fromhex(text)
+    length = (len(data) - 1) // 2 if service == 3 else len(data)
+    return bytes([length << 3 | service]) + data
+
+
+def any_telegram(to, source, code, text=""):
+    data = bytes.fromhex(text)
+    return bytes([0x8D, to, source, code, len(data)]) + data
+
+
+def octets_come(text, pause=True):
+    data = bytes.fromhex(text)
+    return bytes([0x80 if pause else 0x81, len(data)]) + data
+
+
+P29, P13, CELL, CONVERTER, SHORT_WORD, ON_A_PC, SEARCHING = (
+    slave(), slave(0), slave(3), slave(12), slave(12, 0x46), slave(1, 0x26), slave(1, 0x16)
+)
+FULL_RANGE = "B801C80B059B00000A0000200020000000"
+MANUAL = "B801C80B059B00000A00000E10000E1000"
+RUNNING = asks(3, MANUAL) + asks(4, "F1") + asks(1) + asks(0, "00000000")
+ONE_WORD = asks(3, MANUAL) + asks(4, "F0") + asks(1) + asks(0, "0000")
+PRESET = asks(0, "80001234") + asks(0, "00001234")
+AGAIN, HEARS_ITSELF, BROKEN, MEDIUM = b"\x89", b"\x8B", b"\x88", b"\x8F"
+FDL_STATUS = any_telegram(7, 2, 0x49)
+
+for name, octets in {
+    "bring-up": P29 + FDL_STATUS + asks(1) + asks(2) + asks(3, FULL_RANGE) + asks(4, "F1") + asks(1) + asks(0, "00000000") * 3,
+    "one-call": P29 + b"\x8E\xF1" + asks(0, "00000000"),
+    "preset": P29 + RUNNING + PRESET + TAKEN + asks(1) + shaft(4711) + asks(0, "00001234"),
+    "preset-out-of-range": P29 + RUNNING + asks(0, "FFFFFFFF") + asks(0, "00000000") + asks(1) + PRESET,
+    "preset-repeated": P29 + RUNNING + asks(0, "80000007") + AGAIN + shaft(99) + AGAIN,
+    "preset-and-power-cut": P29 + RUNNING + PRESET + power_cut(40) + RUNNING,
+    "preset-refused-by-the-memory": P29 + RUNNING + PRESET + REFUSED + PRESET + wait(61000) + TAKEN,
+    "one-word": P13 + asks(3, "B801C80B059B000002") + asks(4, "F0") + asks(1) + asks(0, "0000") + asks(0, "8005"),
+    "one-word-of-29-bits": P29 + ONE_WORD + asks(0, "8005"),
+    "class-1": P29 + asks(3, "B801C80B059B00") + asks(4, "D1") + asks(1) + asks(0) * 3,
+    "ccw": P29 + asks(3, "B801C80B059B00000B00000E10000E1000") + asks(4, "F1") + shaft(5, 2) + asks(0, "00000000") + wait(20),
+    "parameters-refused": P29 + asks(3, "B801C80B059B00000A0000200120000000") + asks(4, "F1") + asks(1),
+    "wrong-ident-number": P29 + asks(3, "B801C80B059C00") + asks(4, "F1") + asks(1),
+    "dp-v1": P29 + asks(3, "B801C80B059B00800A") + asks(1),
+    "configuration-refused": P29 + asks(3, MANUAL) + asks(4, "F1F1") + asks(1),
+    "watchdog": P29 + asks(3, "8801010B059B00040A0000200020000000") + asks(4, "F1") + asks(0, "00000000") + wait(2) + asks(1),
+    "sync": P29 + RUNNING + asks(7, "2000") + asks(0, "80000001") + asks(7, "2000") + asks(0, "00000000") + asks(7, "1000"),
+    "freeze": P29 + RUNNING + asks(7, "0800") + shaft(1000) + asks(0, "00000000") + asks(7, "0800") + asks(7, "0400") + asks(5),
+    "clear": P29 + RUNNING + asks(0, "80000001") + asks(7, "0200") + asks(0, "80000002") + asks(6),
+    "lost-answers": P29 + RUNNING + MEDIUM + asks(0, "00000000") + AGAIN * 2 + MEDIUM + AGAIN + FDL_STATUS,
+    "own-echo": P29 + RUNNING + HEARS_ITSELF + asks(1) + HEARS_ITSELF,
+    "two-masters": P29 + RUNNING + any_telegram(0x87, 0x83, 0x5D, "3D3E" + FULL_RANGE) + any_telegram(0x87, 0x83, 0x5C, "3C3E") + any_telegram(7, 3, 0x7D, "00000000"),
+    "unlock": P29 + RUNNING + asks(3, "4000000B059B00") + any_telegram(0x87, 0x83, 0x5D, "3D3E" + FULL_RANGE),
+    "token-between": P29 + asks(1) + octets_come("DC0203") + AGAIN + octets_come("DC0302"),
+    "another-station": P29 + asks(1) + any_telegram(8, 2, 0x49) + octets_come("100208000A16") + AGAIN,
+    "broken": P29 + RUNNING + octets_come("680707680702") + BROKEN + octets_come("5D0000000066 16".replace(" ", ""), False) + b"\x83\x64\x00" + asks(0, "00000000"),
+    "cut-off": P29 + octets_come("6805056887826C") + wait(1) + asks(1),
+    "in-pieces": ON_A_PC + octets_come("680505688782") + octets_come("6C3C3EEF16", False) + RUNNING,
+    "two-in-one-piece": ON_A_PC + octets_come("DC0202100702495216"),
+    "sd3": P29 + octets_come("A207024D0000000000000000" + "5616"),
+    "half-extended": P29 + any_telegram(0x87, 2, 0x5D, "3C") + any_telegram(7, 0x82, 0x5D, "3E"),
+    "search": SEARCHING + wait(200) + FDL_STATUS * 2 + RUNNING + wait(1500) + FDL_STATUS + asks(1),
+    "alarm": P29 + RUNNING + shaft(0, 2) + wait(1) + shaft(100_000, 2) + wait(2) + asks(0, "00000000") + asks(1) + asks(0, "00000000") + wait(2600) + asks(0, "00000000"),
+    "cell-low": CELL + RUNNING + shaft(0, 1) + asks(0, "00000000") + asks(1) + shaft(0, 0) + asks(0, "00000000"),
+    "line-fault": CONVERTER + shaft(0, 4) + RUNNING + shaft(5, 0) + asks(0, "00000000") + shaft(5, 4) + wait(3) + asks(1) + shaft(6, 8) + asks(0, "00000000"),
+    "short-word": SHORT_WORD + RUNNING + shaft((1 << 25) - 1) + asks(0, "00000000") + shaft(0) + PRESET,
+    "switches": P29 + b"\x8C\x02" + power_cut(0) + asks(1) + RUNNING + b"\x8C\x63" + power_cut(0) + RUNNING,
+    "record-with-turns": b"\x81\x06" + record(5, 3600, 360000, k=3, r=99) + RUNNING + shaft(1 << 28) + TAKEN,
+    "record-nobody-can-use": b"\x81\x06" + record(1, 0, 0) + RUNNING + PRESET + TAKEN,
+    "late": P29 + RUNNING + b"\x84" + pack("<H", 6000) + asks(0, "00000000"),
+}.items():
+    write("profibus_slave", name, octets)
+
+# --- the PROFIBUS master: master 2, slaves 7 to 9 ---------------------------------------------------
+
+MASTER = b"\x06"
+BY_ITSELF, AS_IT_SHOULD, SHORT, SILENT = b"\x16", b"\x62", b"\x60", b"\x64"
+
+
+def data(text, high=False):
+    octets = bytes.fromhex(text)
+    return bytes([0x20 * high | len(octets)]) + octets
+
+
+def bits(count):
+    return b"\x83" + pack("<H", count)
+
+
+for name, octets in {
+    "bring-up": BY_ITSELF + wait(100),
+    "slow": b"\x10" + wait(5000),
+    "fast": b"\x19" + wait(20),
+    "nobody-there": MASTER + wait(100),
+    "answers-one-by-one": MASTER + (bits(400) + AS_IT_SHOULD) * 60,
+    "wrong-ident-number": MASTER + (bits(400) + data("42050002059C")) * 10,
+    "prm-fault": MASTER + (bits(400) + AS_IT_SHOULD + bits(400) + data("420500FF059B")) * 10,
+    "cfg-fault": MASTER + (bits(400) + AS_IT_SHOULD + bits(400) + data("060500FF059B")) * 10,
+    "of-another-master": MASTER + (bits(400) + data("000C0003059B")) * 10,
+    "not-ready": MASTER + (bits(400) + data("020C0002059B")) * 20,
+    "short-diagnosis": MASTER + (bits(400) + data("0205")) * 5,
+    "diagnosis-without-length": BY_ITSELF + wait(50) + SILENT + (bits(300) + data("080C0002059B 00 00".replace(" ", ""), True)) * 8,
+    "high-priority": BY_ITSELF + wait(50) + SILENT + bits(300) + data("00001234", True) + SILENT + wait(5),
+    "wrong-length": BY_ITSELF + wait(50) + SILENT + (bits(300) + data("001234")) * 6,
+    "refused": BY_ITSELF + wait(50) + SILENT + (bits(300) + b"\x61\x03") * 6 + SILENT + wait(50),
+    "no-resource": BY_ITSELF + wait(50) + SILENT + (bits(300) + b"\x61\x02") * 6,
+    "acknowledges-everything": MASTER + (bits(400) + SHORT) * 12,
+    "lost-and-back": BY_ITSELF + wait(50) + SILENT + wait(200) + SILENT + wait(100),
+    "restarts": BY_ITSELF + wait(50) + b"\x63\x01" + wait(50) + b"\x63\x02" + wait(50),
+    "outputs": BY_ITSELF + wait(50) + b"\x86\x07\x80" + wait(5) + b"\x86\x0A\x00" + b"\x87\x08" + wait(5),
+    "own-address": BY_ITSELF + wait(50) + b"\x89\x07\x02\x49" + wait(1500),
+    "another-master-joins": BY_ITSELF + wait(20) + b"\x89\x02\x05\x49" + b"\x88\x02\x05" + bits(500) + b"\x88\x05\x05" * 3 + wait(50),
+    "token-to-nobody": MASTER + b"\x88\x7F\x02" + b"\x88\xFF\xFF" + wait(20),
+    "broken": BY_ITSELF + wait(20) + SILENT + bits(100) + b"\x85" + octets_come("680707680702") + b"\x85" + bits(300) + SILENT + wait(50),
+    "in-pieces": MASTER + bits(400) + octets_come("680B0B68", False) + bits(3) + octets_come("8287083E3C020500FF059B1116", False) + wait(20),
+    "garbage": BY_ITSELF + octets_come("00112233445566778899AABBCCDDEEFF" * 8) + wait(10),
+    "late": BY_ITSELF + wait(20) + b"\x84" + pack("<H", 3000) + wait(20),
+    "to-another": MASTER + (bits(400) + b"\x42\x00\x05") * 5,
+}.items():
+    write("profibus_master", name, octets)
 
 # --- SLCAN ----------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ entry=codewheel_exercise
 
 # The crates of which at least one function must be found in the linked object. A crate that
 # `exercise` calls into belongs here.
-linked_crates=(station encoder devicenet device)
+linked_crates=(station encoder devicenet profibus device)
 
 # What an allocator looks like, mangled or not.
 allocator='__(rust|rdl|rg)_(alloc|dealloc|realloc)|__rust_no_alloc_shim|(^|[^a-z_])(malloc|calloc|realloc|free)$|alloc::(alloc|raw_vec|vec|boxed|string)::'

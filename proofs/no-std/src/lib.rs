@@ -4,21 +4,28 @@
 //! Only what [`exercise`] reaches is linked, so what a firmware calls belongs there.
 #![no_std]
 
-use codewheel_device::{DeviceNetEncoder, Event, Factory, Snapshot, Switches, product};
+use codewheel_device::{
+    DeviceNetEncoder, Event, Factory, ProfibusEncoder, Snapshot, Switches, product, profibus,
+};
 use codewheel_devicenet::MacId;
 use codewheel_devicenet::scanner::{Response, Scanner, ScannerIdentity, SlaveSettings};
+use codewheel_encoder::ssi;
 use codewheel_encoder::{RECORD_OCTETS, Sample, Sensor, choose, encode};
+use codewheel_profibus::{Baud, Timing};
 use codewheel_station::can::{BitRate, Frame, Input};
+use codewheel_station::rs485;
 use codewheel_station::{Duration, Instant, Reader, Station};
 
 /// Calls into the core crates the way a firmware does. `input` is what the compiler cannot know, so
 /// nothing is computed at compile time; the sum returned keeps everything alive.
 ///
-/// Both stations get the same input, a row of frames: two octets of identifier, a length, the data.
+/// The stations on CAN get the same input, a row of frames: two octets of identifier, a length, the
+/// data. The slave on RS-485 gets the octets as they are, in pieces of any length.
 fn exercise(input: &[u8]) -> u32 {
     let mut sum = Sum(0);
     encoder(input, &mut sum);
     scanner(input, &mut sum);
+    profibus(input, &mut sum);
     sum.0
 }
 
@@ -86,6 +93,60 @@ fn scanner(input: &[u8], sum: &mut Sum) {
     }
 }
 
+/// A converter or encoder on PROFIBUS that searches its rate, with an SSI line as its sensor.
+fn profibus(input: &[u8], sum: &mut Sum) {
+    let mut slots = [[0; RECORD_OCTETS]; 2];
+    for (to, from) in slots.as_flattened_mut().iter_mut().zip(input) {
+        *to = *from;
+    }
+    let [a, b] = &slots;
+    let start = choose(a, b);
+    let (_, mut sequence) = start.next();
+    let mut reader = Reader::new(input);
+    let address = reader.u8().unwrap_or_default();
+    let sampled = reader.u32_le().unwrap_or_default();
+    let products = &product::PROFIBUS;
+    let Some(product) = products.get(usize::from(address) % products.len()) else { return };
+    let Some(word) = ssi::Word::choices(product.encoder.geometry).first() else { return };
+    let settings = ssi::Settings::of_word(*word);
+    let Ok(sensor) = ssi::Input::new(Wire { sampled }, settings) else { return };
+    let factory = profibus::Factory {
+        model: product.encoder,
+        serial: sampled,
+        baud: Baud::Search,
+        timing: Timing::Exact,
+    };
+    let switches = profibus::Switches::set_to(address);
+    let mut now = Instant::ZERO;
+    let mut device = ProfibusEncoder::power_up(now, product, factory, switches, &start, sensor);
+    for _ in 0..TURNS {
+        now = device.deadline().unwrap_or(now + Duration::from_millis(1)).max(now);
+        device.advance(now);
+        let length = usize::from(reader.u8().unwrap_or_default());
+        if let Ok(octets) = reader.octets(length) {
+            device.handle(now, rs485::Input::Octets(octets));
+        }
+        if let Some(kept) = device.keep(now) {
+            let [a, _] = &mut slots;
+            *a = encode(&kept, sequence);
+            sequence = sequence.wrapping_add(1);
+            device.kept(now, Ok::<(), ()>(()));
+        }
+        if let Some(answer) = device.transmit(now) {
+            sum.add(answer.octets());
+        }
+        while let Some((at, event)) = device.take_event() {
+            sum.add(&at.as_nanos().to_le_bytes());
+            sum.add(&[u8::from(event == Event::Saved)]);
+        }
+    }
+    device.handle(now, rs485::Input::BrokenCharacter);
+    let Snapshot { position, colour, .. } = device.snapshot(now);
+    sum.add(&position.to_le_bytes());
+    sum.add(&[colour as u8]);
+    sum.add(slots.as_flattened());
+}
+
 /// Drives `station` through its duplicate MAC ID check and past each frame of `input`, from
 /// `start` on; `serve` comes in each turn. Gives the time of the end.
 fn run<S>(
@@ -137,6 +198,17 @@ impl Sensor for Still {
 
     fn changes_at(&self, _: Instant) -> Option<Instant> {
         None
+    }
+}
+
+/// An SSI line that always shows the same.
+struct Wire {
+    sampled: u32,
+}
+
+impl ssi::Line for Wire {
+    fn transfer(&mut self, _: Instant, clocks: u8, _: u32) -> Option<u64> {
+        (clocks > 0).then_some(u64::from(self.sampled))
     }
 }
 

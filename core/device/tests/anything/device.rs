@@ -19,6 +19,7 @@
 //! | 8B | | the medium takes nothing from now on, or again something |
 //! | 8C | switches u8 | the address switches are turned |
 //! | 8D | | the fragment sent last is acknowledged |
+//! | 8E, 8F | | the plug is pulled out; it is put in again |
 //!
 //! Every other octet does nothing. An operation that the input ends in takes zeros.
 
@@ -67,6 +68,8 @@ struct Bench {
     sent: Option<Frame>,
     medium_takes: bool,
     bus_off: bool,
+    /// The plug is out.
+    detached: bool,
 }
 
 /// Does what `octets` say and fails where the device does what it must not.
@@ -116,6 +119,7 @@ impl Bench {
             sent: None,
             medium_takes: true,
             bus_off: false,
+            detached: false,
         }
     }
 
@@ -158,12 +162,12 @@ impl Bench {
             }
             0x86 if self.writing.take().is_some() => self.device.kept(self.now, Err(())),
             0x87 => self.lose_power(usize::from(reader.u8().unwrap_or_default())),
-            0x88 => {
+            0x88 if !self.detached => {
                 self.bus_off = true;
                 self.mailbox = None;
                 self.device.handle(self.now, Input::BusOff);
             }
-            0x89 if self.bus_off => {
+            0x89 if self.bus_off && !self.detached => {
                 self.bus_off = false;
                 self.device.handle(self.now, Input::Recovered);
             }
@@ -190,12 +194,22 @@ impl Bench {
                 let acknowledge = [sent.data()[0], sent.data()[1] | 0xC0, 0];
                 self.hear(&Frame::standard(bits & !7 | 4, &acknowledge));
             }
+            0x8E => {
+                self.detached = true;
+                self.mailbox = None;
+                self.device.handle(self.now, Input::Detached);
+            }
+            // The controller is started anew.
+            0x8F if self.detached => {
+                (self.detached, self.bus_off) = (false, false);
+                self.device.handle(self.now, Input::Attached);
+            }
             _ => {}
         }
     }
 
     fn hear(&mut self, frame: &Frame) {
-        if !self.bus_off {
+        if !self.bus_off && !self.detached {
             self.device.handle(self.now, Input::Frame(frame));
         }
     }
@@ -239,7 +253,7 @@ impl Bench {
             _ => panic!("{before:?} and a write cut after {octets} octets gave {after:?}"),
         }
         self.mailbox = None;
-        self.bus_off = false;
+        (self.bus_off, self.detached) = (false, false);
         let (product, switches) = (self.device.product(), self.device.switches());
         let hand = self.device.sensor_mut().clone();
         let factory = Factory::with_serial(7);
@@ -252,7 +266,7 @@ impl Bench {
         let mut frames = 0;
         loop {
             self.writing = self.writing.or_else(|| self.device.keep(self.now));
-            if self.bus_off || self.mailbox.is_some() {
+            if self.bus_off || self.detached || self.mailbox.is_some() {
                 break;
             }
             let status = self.device.server().status();
@@ -269,7 +283,7 @@ impl Bench {
         while let Some((at, event)) = self.device.take_event() {
             assert!(at <= self.now && !event.to_string().is_empty());
         }
-        if !self.bus_off && self.mailbox.is_none() {
+        if !self.bus_off && !self.detached && self.mailbox.is_none() {
             let deadline = self.device.deadline();
             assert!(deadline.is_none_or(|at| at > self.now), "{deadline:?} lies in the past");
             self.device.advance(self.now);
