@@ -54,6 +54,14 @@ pub(crate) enum Verb {
     Encoder(Box<EncoderArguments>),
     Models(ModelsArguments),
     Describe(DescribeArguments),
+    /// Write the EDS file of a DeviceNet model, for the configuration tool of its scanner.
+    #[command(after_help = EDS_EXAMPLES)]
+    Eds(SheetArguments),
+    /// Write the GSD file of a PROFIBUS model, for the configuration tool of its master.
+    #[command(after_help = GSD_EXAMPLES)]
+    Gsd(SheetArguments),
+    Hilo(HiloArguments),
+    Doctor(DoctorArguments),
     /// Print the JSON Schema of plant files, for editors that complete and check them.
     Schema,
 }
@@ -103,13 +111,18 @@ Shafts: still | turn rpm=60 | sine amplitude=90deg period=2s |
         profile 0s:0 1s:90deg 3s:2turns [repeat] | csv FILE (lines of seconds,turns).
         Each takes angle=, where it begins: raw steps (4096), 90deg or 1.5turns.
 
-Buses:  slcan-listen:HOST:PORT   DeviceNet: play a SLCAN adapter that any number of clients share
-        slcan:HOST:PORT          DeviceNet: be the client of a SLCAN adapter on TCP
-        rs485-listen:HOST:PORT   PROFIBUS: be a line on TCP that any number of clients share
-        rs485-listen:pty:PATH    PROFIBUS: be a line that is a serial port of this machine
-        rs485:HOST:PORT          PROFIBUS: be the client of such a line
-        rs485:/dev/tty…          PROFIBUS: a serial port
-        virtual:NAME             a bus inside this process
+Buses:  slcan-listen:HOST:PORT       DeviceNet: play an SLCAN adapter that any number of clients share
+        slcan-listen:pty:PATH        DeviceNet: play one at a serial port of this machine
+        slcan:HOST:PORT              DeviceNet: be the client of an SLCAN adapter on TCP
+        slcan:/dev/ttyACM0[@SPEED]   DeviceNet: an SLCAN adapter at a serial port
+        socketcan:can0               DeviceNet: a CAN interface of Linux
+        socketcand-listen:HOST:PORT  DeviceNet: play a socketcand server
+        rs485-listen:HOST:PORT       PROFIBUS: be a line on TCP that any number of clients share
+        rs485-listen:pty:PATH        PROFIBUS: be a line that is a serial port of this machine
+        rs485:HOST:PORT              PROFIBUS: be the client of such a line
+        rs485:/dev/tty…              PROFIBUS: a serial port
+        virtual:NAME                 a bus inside this process
+        `codewheel doctor --bus URI` says whether one can be used, and what it can hold.
 
 Faults: jump steps=N | stuck | free | cell-low | cell-right | power-cut [for=T] |
         drop-answers [probability=P] [count=N] [for=T] | late-answers delay=T [for=T] |
@@ -193,12 +206,113 @@ pub(crate) struct ModelsArguments {
     pub(crate) json: bool,
 }
 
-/// Describe one model: geometry, switches, lamp, and what its bus can read and write.
+/// Describe models: geometry, switches, lamp, and what their bus can read and write.
+///
+/// --all gives a chapter for each bus: what its models share once, what differs with the models it
+/// is for. With --json, one object a line for each model.
 #[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel describe amg11-p29
+  codewheel describe amg11-d29 --json | jq '.attributes[] | select(.access == \"read/write\").key'
+  codewheel describe --all --markdown -o docs/book/src/reference --force")]
 pub(crate) struct DescribeArguments {
-    /// The model, such as amg11-d29
+    /// The model, such as amg11-d29; `codewheel models` lists them
+    #[arg(value_parser = parse_model, required_unless_present = "all", conflicts_with = "all")]
+    pub(crate) model: Option<&'static Product>,
+
+    /// All models
+    #[arg(long)]
+    pub(crate) all: bool,
+
+    /// Markdown, as in the book
+    #[arg(long)]
+    pub(crate) markdown: bool,
+
+    /// JSON: one object a line
+    #[arg(long, conflicts_with = "markdown")]
+    pub(crate) json: bool,
+
+    #[command(flatten)]
+    pub(crate) output: OutputArguments,
+}
+
+/// Where files go.
+#[derive(Args, Debug)]
+pub(crate) struct OutputArguments {
+    /// Write files into this folder and print where they are, instead of their text
+    #[arg(short = 'o', long = "output", value_name = "DIR")]
+    pub(crate) folder: Option<PathBuf>,
+
+    /// Replace files that are there and say something else
+    #[arg(long, requires = "folder")]
+    pub(crate) force: bool,
+}
+
+const EDS_EXAMPLES: &str = "\
+Examples:
+  codewheel eds amg11-d29
+  codewheel eds amg11-d29 -o .      AMG11D29.eds, as the manual calls it
+  codewheel eds -o eds              the files of all DeviceNet models";
+
+const GSD_EXAMPLES: &str = "\
+Examples:
+  codewheel gsd amg11-p29
+  codewheel gsd amg11-p29 -o .      PB29DPV0.GSD, as the manual calls it
+  codewheel gsd -o gsd              the files of all PROFIBUS models";
+
+/// Which data sheets.
+#[derive(Args, Debug)]
+pub(crate) struct SheetArguments {
+    /// The model; without it all of the bus, with -o
     #[arg(value_parser = parse_model)]
-    pub(crate) model: &'static Product,
+    pub(crate) model: Option<&'static Product>,
+
+    #[command(flatten)]
+    pub(crate) output: OutputArguments,
+}
+
+/// Split a number into the hi and lo words that configuration tools ask for, or put it together.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel hilo 921600             hi 14 lo 4096
+  codewheel hilo 14 4096            921600
+  codewheel hilo 0xE1000 --json     {\"value\":921600,\"hi\":14,\"lo\":4096}")]
+pub(crate) struct HiloArguments {
+    /// The number to split; with LO behind it the hi word. Decimal, 0xE1000 or E1000h
+    #[arg(value_name = "NUMBER", value_parser = crate::hilo::number)]
+    pub(crate) value: u32,
+
+    /// The lo word
+    #[arg(value_parser = crate::hilo::number)]
+    pub(crate) lo: Option<u32>,
+
+    /// One JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Say what this machine and its adapter can hold: how fast it answers, which PROFIBUS rates that
+/// suits, what is missing, and what to do about it.
+///
+/// Nothing is sent on the bus. Each finding comes with its remedy.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel doctor
+  codewheel doctor --bus rs485:/dev/ttyUSB0
+  codewheel doctor --bus socketcan:can0 --json
+
+Exit codes: 0 all is well, 1 findings, 3 the bus cannot be used.")]
+pub(crate) struct DoctorArguments {
+    /// A bus to look at besides
+    #[arg(long, value_name = "URI")]
+    pub(crate) bus: Option<BusUri>,
+
+    /// One JSON object a line, for each finding
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 fn parse_model(text: &str) -> Result<&'static Product, String> {

@@ -1,6 +1,7 @@
 //! How a verb ends when it does not succeed.
 
 use std::io;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use codewheel_link::LinkError;
@@ -21,6 +22,13 @@ pub(crate) enum Failure {
     Start(#[from] StartError),
     #[error(transparent)]
     Link(#[from] LinkError),
+    #[error("cannot keep {}: {reason}; check that the folder is there and may be written", .path.display())]
+    File {
+        /// What was to be read or written.
+        path: PathBuf,
+        /// What the system said.
+        reason: io::Error,
+    },
     #[error("cannot write to stdout: {0}")]
     Output(#[from] io::Error),
     #[error("cannot catch Ctrl-C: {0}")]
@@ -47,6 +55,7 @@ impl Failure {
             Self::Plant(PlantError::Read { .. })
             | Self::Start(_)
             | Self::Link(_)
+            | Self::File { .. }
             | Self::Output(_)
             | Self::Signals(_) => 3,
         })

@@ -2,10 +2,15 @@
 
 mod arguments;
 mod describe;
+mod doctor;
+mod document;
 mod encoder;
 mod failure;
+mod files;
+mod hilo;
 mod models;
 mod run;
+mod sheets;
 mod show;
 mod signals;
 mod tell;
@@ -13,22 +18,33 @@ mod tell;
 use std::process::ExitCode;
 
 use clap::Parser;
+use codewheel_device::product::Bus;
 
 use crate::arguments::{Arguments, Verb};
+use crate::failure::Failure;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let chatter = arguments.chatter();
     let result = match arguments.verb {
+        Some(Verb::Doctor(doctor)) => return end(doctor::run(&doctor)),
         None => run::demo(chatter),
         Some(Verb::Run(arguments)) => run::run(&arguments, chatter),
         Some(Verb::Schema) => run::schema(),
         Some(Verb::Encoder(encoder)) => encoder::run(&encoder, chatter),
         Some(Verb::Models(models)) => models::run(&models),
         Some(Verb::Describe(describe)) => describe::run(&describe),
+        Some(Verb::Eds(sheet)) => sheets::run(&sheet, Bus::DeviceNet),
+        Some(Verb::Gsd(sheet)) => sheets::run(&sheet, Bus::Profibus),
+        Some(Verb::Hilo(numbers)) => hilo::run(&numbers),
     };
+    end(result.map(|()| ExitCode::SUCCESS))
+}
+
+/// How the program ends, and what it says about a failure.
+fn end(result: Result<ExitCode, Failure>) -> ExitCode {
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(failure) if failure.is_closed_pipe() => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("codewheel: {failure}");

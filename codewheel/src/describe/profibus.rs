@@ -1,6 +1,4 @@
-//! A PROFIBUS model in words.
-
-use std::io::Write;
+//! A PROFIBUS model in sections.
 
 use codewheel_device::Product;
 use codewheel_device::product::Shaft;
@@ -8,131 +6,174 @@ use codewheel_device::profibus::{IDENT_NUMBER, configuration, diagnosis, paramet
 use codewheel_encoder::ssi::Word;
 use codewheel_sim::rs485::longest_cable;
 use codewheel_station::rs485::BaudRate;
-use comfy_table::{Table, presets};
+use serde_json::json;
 
-use super::facts;
-use crate::failure::Failure;
+use super::product;
+use crate::document::{Body, Cell, Fact, Section, Table, column, prose};
 
-pub(super) fn describe(product: &Product, out: &mut impl Write) -> Result<(), Failure> {
-    let rates: Vec<_> = BaudRate::ALL.iter().map(ToString::to_string).collect();
-    facts(
-        product,
-        &[
-            ("Bus", "PROFIBUS-DP, DP-V0 slave, encoder profile 1.1 class 1 and 2".to_owned()),
-            ("Ident number", format!("{IDENT_NUMBER:04X}h")),
-            ("Bit rates", format!("{}, found by itself", rates.join(", "))),
-            ("GSD file", product.data_sheet.to_owned()),
-        ],
-        out,
-    )?;
-    if product.family.shaft() == Shaft::None {
-        ssi(product, out)?;
+pub(super) fn sections(of: &'static Product) -> Vec<Section> {
+    let facts = vec![
+        Fact::new("bus", "Bus", "PROFIBUS-DP, DP-V0 slave, encoder profile 1.1 class 1 and 2"),
+        Fact::new(
+            "ident-number",
+            "Ident number",
+            Cell::both(format!("{IDENT_NUMBER:04X}h"), IDENT_NUMBER),
+        ),
+        Fact::new("bit-rates", "Bit rates", format!("{}, found by itself", names(&BaudRate::ALL))),
+        Fact::new("gsd-file", "GSD file", Cell::literal(of.data_sheet)),
+    ];
+    let mut sections = vec![product(of, facts)];
+    if of.family.shaft() == Shaft::None {
+        sections.push(ssi(of));
     }
-    writeln!(
-        out,
-        "\nSwitches (read at power-up)
-  Address         rotary switch 1 tens, switch 2 units; station address 0–99, delivered as 00
-  Termination     two-pole DIP switch; ON at the last device of the bus line, delivered OFF:
-                  390 Ω A to GND, 390 Ω B to +5 V, 220 Ω A to B
+    sections.extend([switches(), terminals(), lamp(), cable(), configurations()]);
+    sections.extend([set_prm(of), slave_diag()]);
+    sections
+}
 
-Terminals
-  A, B            the negative and the positive data line, each twice
-  UB, GND         the supply, 10–30 V DC
+fn names(rates: &[BaudRate]) -> String {
+    rates.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
 
-Lamp
-  off             no power
-  yellow          on the way to the exchange of data
-  green           data is exchanged
-  red             position error, 2.5 s; or a fault of the SSI line
-  red flashing    1 Hz: parameters or configuration refused
-  red flashing    5 Hz: preset out of range
-"
-    )?;
-    writeln!(out, "Cable of type A, at most")?;
+fn ssi(product: &Product) -> Section {
+    let words = Word::choices(product.encoder.geometry);
+    let words: Vec<_> = words.iter().map(|word| word.bits().to_string()).collect();
+    let word = format!("{} bits, Gray (default) or binary", words.join(" (default) or "));
+    let facts = vec![
+        Fact::new("word", "Word", word),
+        Fact::new(
+            "clock",
+            "Clock",
+            "100 kHz to 1 MHz, default 500 kHz; a reading each millisecond",
+        ),
+        Fact::new("monoflop", "Monoflop", "default 20 µs"),
+    ];
+    Section::new("ssi", "SSI input", Body::Facts(facts))
+}
+
+fn switches() -> Section {
+    let facts = vec![
+        Fact::new(
+            "address",
+            "Address",
+            "rotary switch 1 tens, switch 2 units; station address 0–99, delivered as 00",
+        ),
+        Fact::new(
+            "termination",
+            "Termination",
+            "two-pole DIP switch; ON at the last device of the bus line, delivered OFF",
+        ),
+        Fact::new("resistors", "Resistors", "390 Ω A to GND, 390 Ω B to +5 V, 220 Ω A to B"),
+    ];
+    Section::new("switches", "Switches (read at power-up)", Body::Facts(facts))
+}
+
+fn terminals() -> Section {
+    let terminals = [
+        ("A, B", "the negative and the positive data line, each twice"),
+        ("UB, GND", "the supply, 10–30 V DC"),
+    ];
+    let columns = [column("terminal", "TERMINAL"), column("meaning", "MEANING")];
+    Section::new("terminals", "Terminals", Body::Table(Table::pairs(columns, terminals)))
+}
+
+fn lamp() -> Section {
+    let states = [
+        ("off", "no power"),
+        ("yellow", "on the way to the exchange of data"),
+        ("green", "data is exchanged"),
+        ("red", "position error, 2.5 s; or a fault of the SSI line"),
+        ("red flashing", "1 Hz: parameters or configuration refused"),
+        ("red flashing", "5 Hz: preset out of range"),
+    ];
+    let columns = [column("lamp", "LAMP"), column("meaning", "MEANING")];
+    Section::new("lamp", "Lamp", Body::Table(Table::pairs(columns, states)))
+}
+
+fn cable() -> Section {
+    let mut lengths = Vec::new();
     let mut rates = BaudRate::ALL.as_slice();
     while let Some(first) = rates.first() {
         let longest = longest_cable(*first);
         let alike = rates.partition_point(|rate| longest_cable(*rate) == longest);
-        let names: Vec<_> = rates[..alike].iter().map(ToString::to_string).collect();
-        writeln!(out, "  {:<16}at {}", format!("{longest} m"), names.join(", "))?;
+        let length = Cell::both(format!("{longest} m"), longest);
+        lengths.push((length, format!("at {}", names(&rates[..alike])).into()));
         rates = &rates[alike..];
     }
-    configurations(out)?;
-    set_prm(product, out)?;
-    slave_diag(out)
+    let columns = [column("longest", "LENGTH"), column("rates", "RATES")];
+    Section::new("cable", "Cable of type A, at most", Body::Table(Table::pairs(columns, lengths)))
 }
 
-fn ssi(product: &Product, out: &mut impl Write) -> Result<(), Failure> {
-    let words = Word::choices(product.encoder.geometry);
-    let words: Vec<_> = words.iter().map(|word| word.bits().to_string()).collect();
-    writeln!(
-        out,
-        "\nSSI input
-  Word            {} bits, Gray (default) or binary
-  Clock           100 kHz to 1 MHz, default 500 kHz; a reading each millisecond
-  Monoflop        default 20 µs",
-        words.join(" (default) or ")
-    )?;
-    Ok(())
-}
-
-fn table(header: impl IntoIterator<Item = &'static str>) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING);
-    table.set_header(header);
-    table
-}
-
-fn configurations(out: &mut impl Write) -> Result<(), Failure> {
-    writeln!(out, "\nConfigurations (Chk_Cfg)")?;
-    let mut table = table(["ID", "CLASS", "INPUT", "OUTPUT", "MEANING"]);
+fn configurations() -> Section {
+    let mut table = Table::new(vec![
+        column("identifier", "ID"),
+        column("class", "CLASS"),
+        column("input", "INPUT"),
+        column("output", "OUTPUT"),
+        column("help", "MEANING"),
+    ]);
+    let octets = |count: u8| match count {
+        0 => Cell::both("none", 0),
+        count => Cell::both(format!("{count} octets"), count),
+    };
     for row in &configuration::ROWS {
-        table.add_row([
-            format!("{:02X}h", row.identifier),
-            row.class.to_string(),
-            format!("{} octets", row.inputs),
-            if row.outputs == 0 { "none".to_owned() } else { format!("{} octets", row.outputs) },
-            row.help.to_owned(),
+        table.rows.push(vec![
+            Cell::both(format!("{:02X}h", row.identifier), row.identifier),
+            u32::from(row.class).into(),
+            octets(row.inputs),
+            octets(row.outputs),
+            row.help.into(),
         ]);
     }
-    writeln!(out, "{}", table.trim_fmt())?;
-    Ok(())
+    Section::new("configurations", "Configurations (Chk_Cfg)", Body::Table(table))
 }
 
-fn set_prm(product: &Product, out: &mut impl Write) -> Result<(), Failure> {
-    writeln!(out, "\nParameters (Set_Prm, from octet 9 on)")?;
-    let mut table = table(["OCTETS", "BIT", "NAME", "KEY", "DEFAULT", "RANGE"]);
+fn set_prm(product: &Product) -> Section {
+    let mut table = Table::new(vec![
+        column("octets", "OCTETS"),
+        column("bit", "BIT"),
+        column("name", "NAME"),
+        column("key", "KEY"),
+        column("default", "DEFAULT"),
+        column("range", "RANGE"),
+        prose("help", "MEANING"),
+    ]);
     for row in parameters::ROWS {
         let default = (row.default)(product.encoder);
         let range = (row.range)(product.encoder);
         let named = usize::try_from(default).ok().and_then(|place| row.values.get(place));
-        table.add_row([
+        let limits = format!("{} … {} {}", range.start(), range.end(), row.unit);
+        let space = if row.note.is_empty() { "" } else { " " };
+        table.rows.push(vec![
             octets(&row.octets.to_string()),
             match row.field {
-                parameters::Field::Bit(bit) => bit.to_string(),
-                parameters::Field::Unsigned32 { .. } => String::new(),
+                parameters::Field::Bit(bit) => u32::from(bit).into(),
+                parameters::Field::Unsigned32 { .. } => Cell::empty(),
             },
-            row.name.to_owned(),
-            row.key.to_owned(),
-            named.map_or(default.to_string(), |name| format!("{default} ({name})")),
-            format!("{} … {} {}", range.start(), range.end(), row.unit).trim_end().to_owned(),
+            row.name.into(),
+            Cell::literal(row.key),
+            match named {
+                Some(name) => Cell::both(format!("{default} ({name})"), default),
+                None => default.into(),
+            },
+            Cell::both(
+                limits.trim_end(),
+                json!({ "minimum": range.start(), "maximum": range.end() }),
+            ),
+            format!("{}.{space}{}", row.help, row.note).into(),
         ]);
     }
-    writeln!(out, "{}\n", table.trim_fmt())?;
-    for row in parameters::ROWS {
-        let space = if row.note.is_empty() { "" } else { " " };
-        writeln!(out, "  {:<26}{}.{space}{}", row.key, row.help, row.note)?;
-    }
-    Ok(())
+    Section::new("parameters", "Parameters (Set_Prm, from octet 9 on)", Body::Table(table))
 }
 
-fn slave_diag(out: &mut impl Write) -> Result<(), Failure> {
-    writeln!(
-        out,
-        "\nDiagnosis (Slave_Diag, from octet 7 on; class 1 ends with octet {})",
-        diagnosis::CLASS_1_OCTETS
-    )?;
-    let mut table = table(["OCTETS", "CLASS", "NAME", "KEY", "MEANING"]);
+fn slave_diag() -> Section {
+    let mut table = Table::new(vec![
+        column("octets", "OCTETS"),
+        column("class", "CLASS"),
+        column("name", "NAME"),
+        column("key", "KEY"),
+        column("help", "MEANING"),
+    ]);
     for row in &diagnosis::ROWS {
         let bits: Vec<_> =
             row.bits.iter().map(|bit| format!("bit {} {}", bit.bit, bit.name)).collect();
@@ -141,19 +182,22 @@ fn slave_diag(out: &mut impl Write) -> Result<(), Failure> {
         } else {
             format!("{}: {}", row.help, bits.join(", "))
         };
-        table.add_row([
+        table.rows.push(vec![
             octets(&row.octets.to_string()),
-            row.class.to_string(),
-            row.name.to_owned(),
-            row.key.to_owned(),
-            meaning,
+            u32::from(row.class).into(),
+            row.name.into(),
+            Cell::literal(row.key),
+            meaning.into(),
         ]);
     }
-    writeln!(out, "{}", table.trim_fmt())?;
-    Ok(())
+    let title = format!(
+        "Diagnosis (Slave_Diag, from octet 7 on; class 1 ends with octet {})",
+        diagnosis::CLASS_1_OCTETS
+    );
+    Section::new("diagnosis", title, Body::Table(table))
 }
 
 /// `10–13` of `octets 10–13`.
-fn octets(text: &str) -> String {
-    text.trim_start_matches(|letter: char| !letter.is_ascii_digit()).to_owned()
+fn octets(text: &str) -> Cell {
+    text.trim_start_matches(|letter: char| !letter.is_ascii_digit()).into()
 }

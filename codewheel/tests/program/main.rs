@@ -1,6 +1,9 @@
 //! The program as its users meet it at the prompt.
 
+mod data_sheets;
 mod demo;
+mod descriptions;
+mod doctor;
 mod encoder;
 #[cfg(unix)]
 mod profibus;

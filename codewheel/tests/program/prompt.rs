@@ -18,6 +18,14 @@ pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// What the program prints where it succeeds.
+#[track_caller]
+pub(crate) fn printed(arguments: &[&str]) -> String {
+    let output = codewheel(arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    String::from_utf8(output.stdout).expect("text")
+}
+
 /// The path of an example plant.
 pub(crate) fn example(name: &str) -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples").join(name)

@@ -1,6 +1,6 @@
 //! Bad input: one clear sentence, the right exit status, nothing half started.
 
-use crate::prompt::{Running, codewheel, stderr};
+use crate::prompt::{Running, codewheel, printed, stderr};
 
 const BUS: [&str; 4] = ["--bus", "slcan-listen:127.0.0.1:0", "--address", "5"];
 
@@ -178,6 +178,15 @@ fn help_and_version_are_no_errors() {
         assert_eq!(codewheel(&arguments).status.code(), Some(0));
     }
     assert_eq!(codewheel(&["nonsense"]).status.code(), Some(2));
+}
+
+#[test]
+fn the_help_of_every_verb_with_choices_has_examples() {
+    for verb in ["run", "encoder", "describe", "eds", "gsd", "hilo", "doctor"] {
+        let help = printed(&[verb, "--help"]);
+        let example = format!("\n  codewheel {verb} ");
+        assert!(help.contains("Examples:") && help.contains(&example), "{help}");
+    }
 }
 
 #[test]
