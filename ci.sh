@@ -14,7 +14,7 @@ export PATH="$PATH:$HOME/.cargo/bin"
 CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 export CARGO_TARGET_DIR
 steps=(fmt clippy doc test requests segments telegrams no-std bench-builds fuzz-builds deny
-    strangers socketcan)
+    book strangers socketcan)
 
 explain() {
     case $1 in
@@ -29,6 +29,7 @@ explain() {
     bench-builds) echo "the benchmarks build" ;;
     fuzz-builds) echo "the fuzz targets build (fuzz/); their corpus runs in test" ;;
     deny) echo "licences, sources and bans of every dependency (cargo deny, deny.toml)" ;;
+    book) echo "the user's book builds (mdbook, docs/book); its commands and links run in test" ;;
     strangers) echo "masters and parsers that are not ours, or know the manuals alone (strangers/)" ;;
     socketcan) echo "can-utils, on a Linux kernel with emulated controllers, joins us (strangers/)" ;;
     esac
@@ -87,6 +88,13 @@ step_deny() {
         env -u CARGO_TARGET_DIR \
             cargo install cargo-deny --version '^0.20' --locked --debug --quiet
     cargo deny --locked --workspace check licenses bans sources
+}
+
+step_book() {
+    command -v mdbook >/dev/null ||
+        env -u CARGO_TARGET_DIR \
+            cargo install mdbook --version '^0.5' --locked --no-default-features --debug --quiet
+    mdbook build docs/book --dest-dir "$CARGO_TARGET_DIR/book"
 }
 
 step_strangers() {
