@@ -72,7 +72,7 @@ impl<const N: usize> Machine<N> {
             Answer::Diagnosis => {
                 let octets = self.diagnosis(now, data.room(buffer), app)?;
                 if self.master == Some(master) {
-                    self.diagnosis_read = Some(app.diagnosis_version());
+                    self.note_diagnosis_read(master, app);
                 }
                 octets
             }

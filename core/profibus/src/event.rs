@@ -70,6 +70,11 @@ pub enum Event {
         /// These bits, of 0 to 2.
         bits: u8,
     },
+    /// Parameters were taken though bits of octet 8 are set that mean nothing.
+    ReservedOperating {
+        /// These bits, 3 and 4.
+        bits: u8,
+    },
     /// The configuration was accepted: DATA_EXCH.
     DataExchange {
         /// The master.
@@ -130,6 +135,9 @@ impl fmt::Display for Event {
             Self::ParametersRefused(fault) => write!(f, "parameters refused: {fault}"),
             Self::ReservedStationStatus { bits } => {
                 write!(f, "Set_Prm octet 1: reserved bits {bits:02X}h are set, and ignored")
+            }
+            Self::ReservedOperating { bits } => {
+                write!(f, "Set_Prm octet 8: reserved bits {bits:02X}h are set, and ignored")
             }
             Self::DataExchange { master } => write!(f, "data exchange with master {master}"),
             Self::Lost(Loss::Watchdog) => {

@@ -4,12 +4,12 @@ use codewheel_station::rs485::TRANSMISSION_OCTETS;
 use codewheel_station::{Instant, Writer};
 
 use crate::function_code::Reply;
-use crate::parameters::{Parameters, SetParameters};
+use crate::parameters::{Parameters, SetParameters, asks_for_more};
 use crate::process_data::ProcessData;
 use crate::responder::{Answer, SHORTEST_STATION_DELAY};
 use crate::sap;
 use crate::watchdog::Watchdog;
-use crate::{Application, Event, Faults, Loss, ParameterFault, State};
+use crate::{Application, Event, Faults, Loss, State};
 
 const REFUSED: Answer = Answer::Bare(Reply::NotActivated);
 
@@ -32,6 +32,8 @@ pub(crate) struct Machine<const N: usize> {
     pub(crate) data: ProcessData<N>,
     /// The version of the diagnosis that the owner has read; `None` where it must read the first.
     pub(crate) diagnosis_read: Option<u16>,
+    /// The owner that read it.
+    diagnosis_reader: u8,
 }
 
 impl<const N: usize> Machine<N> {
@@ -48,6 +50,7 @@ impl<const N: usize> Machine<N> {
             watchdog: Watchdog::OFF,
             data: ProcessData::new(),
             diagnosis_read: None,
+            diagnosis_reader: 0,
         }
     }
 
@@ -128,8 +131,7 @@ impl<const N: usize> Machine<N> {
             Err(fault) => {
                 app.notice(now, Event::ParametersRefused(fault));
                 app.parameters_refused(now);
-                let not_supported = matches!(fault, ParameterFault::NotSupported { .. });
-                self.refuse_parameters(now, master, not_supported, app);
+                self.refuse_parameters(now, master, asks_for_more(octets), app);
             }
         }
         Answer::ShortAcknowledge
@@ -155,13 +157,27 @@ impl<const N: usize> Machine<N> {
         self.may = (parameters.sync, parameters.freeze);
         self.watchdog = Watchdog::start(now, parameters.watchdog);
         self.data.reset();
-        if self.diagnosis_read.is_none() && !app.has_diagnosis() {
-            self.diagnosis_read = Some(app.diagnosis_version());
+        if !app.has_diagnosis() {
+            if self.diagnosis_read.is_none() {
+                self.diagnosis_read = Some(app.diagnosis_version());
+            }
+        } else if self.diagnosis_reader != master {
+            // What another master has read, this one has not.
+            self.diagnosis_read = None;
         }
         app.notice(now, Event::Parameterized { master });
         if parameters.reserved != 0 {
             app.notice(now, Event::ReservedStationStatus { bits: parameters.reserved });
         }
+        if parameters.reserved_operating != 0 {
+            app.notice(now, Event::ReservedOperating { bits: parameters.reserved_operating });
+        }
+    }
+
+    /// The owner has read the diagnosis as it is now.
+    pub(crate) fn note_diagnosis_read<A: Application>(&mut self, master: u8, app: &A) {
+        self.diagnosis_read = Some(app.diagnosis_version());
+        self.diagnosis_reader = master;
     }
 
     fn refuse_parameters<A: Application>(

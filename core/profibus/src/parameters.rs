@@ -18,6 +18,8 @@ mod status {
 const WATCHDOG_BASE_1_MS: u8 = 0x04;
 /// Bits of octet 8: DP-V1, fail-safe, publisher.
 const NOT_SUPPORTED: u8 = 0xE0;
+/// Bits of octet 8 that mean nothing.
+const RESERVED: u8 = 0x18;
 
 /// What a Set_Prm wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,8 +47,15 @@ pub(crate) struct Parameters<'a> {
     pub(crate) groups: u8,
     /// The reserved bits of station status that are set; they mean nothing.
     pub(crate) reserved: u8,
+    /// Those of octet 8.
+    pub(crate) reserved_operating: u8,
     /// Octets 8 and up.
     pub(crate) user: &'a [u8],
+}
+
+/// Whether octet 8 asks for what a DP-V0 slave has not, whatever else is wrong.
+pub(crate) fn asks_for_more(octets: &[u8]) -> bool {
+    octets.get(7).is_some_and(|operating| operating & NOT_SUPPORTED != 0)
 }
 
 impl<'a> SetParameters<'a> {
@@ -84,6 +93,7 @@ impl<'a> SetParameters<'a> {
             freeze: has(status::FREEZE),
             groups: *groups,
             reserved: station_status & status::RESERVED,
+            reserved_operating: operating & RESERVED,
             user,
         }))
     }
@@ -121,6 +131,7 @@ mod tests {
             freeze: true,
             groups: 3,
             reserved: 0,
+            reserved_operating: 0,
             user: &GOOD[7..],
         };
         assert_eq!(locked(&GOOD), expected);
@@ -156,7 +167,7 @@ mod tests {
         for octet in [0x80, 0x40, 0x20, 0xE4] {
             assert_eq!(read(&with(7, octet)), Err(ParameterFault::NotSupported { octet }));
         }
-        assert!(read(&with(7, 0x18)).is_ok(), "reserved bits of octet 8");
+        assert_eq!(locked(&with(7, 0x1B)).reserved_operating, 0x18);
     }
 
     #[test]

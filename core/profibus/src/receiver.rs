@@ -39,6 +39,10 @@ pub(crate) struct Receiver {
     after_idle: bool,
     /// When the last octet ended; `None` before the first one.
     last: Option<Instant>,
+    /// Since when everything is dropped.
+    dropping_since: Instant,
+    /// It has been dropping for so long that the next telegram may come without a pause.
+    impatient: bool,
     filled: u8,
     buffer: [u8; TRANSMISSION_OCTETS],
 }
@@ -50,6 +54,8 @@ impl Receiver {
             dropping: false,
             after_idle: true,
             last: None,
+            dropping_since: Instant::ZERO,
+            impatient: false,
             filled: 0,
             buffer: [0; TRANSMISSION_OCTETS],
         }
@@ -59,8 +65,16 @@ impl Receiver {
     /// rate is another from now on, and what comes next may be the middle of a telegram.
     pub(crate) fn drop_until_idle(&mut self, now: Instant) {
         self.filled = 0;
-        self.dropping = true;
+        self.begin_dropping(now);
         self.last = Some(now);
+    }
+
+    fn begin_dropping(&mut self, now: Instant) {
+        if !self.dropping {
+            self.dropping = true;
+            self.dropping_since = now;
+            self.impatient = false;
+        }
     }
 
     /// Judges the pause before `count` octets that end at `now`; [`take`](Self::take) them next.
@@ -75,6 +89,8 @@ impl Receiver {
                     return false;
                 }
                 let pause = now.since(last);
+                // Over TCP and in a pty octets take no time, so what they would take on a line is not
+                // taken off: the slave cannot tell, and after 50 ms it is impatient in any case.
                 let abandoned = self.filled > 0 && pause >= ABANDONED_AFTER;
                 if abandoned {
                     self.filled = 0;
@@ -82,12 +98,14 @@ impl Receiver {
                 if pause >= QUIET.max(rate.bits(33)) {
                     self.dropping = false;
                 }
+                self.impatient = self.dropping && now.since(self.dropping_since) >= ABANDONED_AFTER;
                 abandoned
             }
         }
     }
 
-    /// Bits are counted to the nearest half: a UART does no better, and spans of time are rounded.
+    /// Bits are counted to the nearest half, a UART does no better, and with what the clocks of two
+    /// stations drift apart while octets come in one piece.
     #[inline]
     fn arrive_exactly(
         &mut self,
@@ -98,11 +116,13 @@ impl Receiver {
     ) -> bool {
         let span = now.since(last);
         let octets = u64::from(u32::try_from(count).unwrap_or(u32::MAX)) * CHARACTER_HALF_BITS;
-        let idle = lasts(span, octets + 65, rate);
-        let abandoned = self.filled > 0 && lasts(span, octets + 1, rate);
+        // Two clocks may differ by 0.3 % each.
+        let drift = octets * 6 / 1_000;
+        let idle = lasts(span, octets + 65 - drift.min(32), rate);
+        let abandoned = self.filled > 0 && lasts(span, octets + 1 + drift, rate);
         if abandoned {
             self.filled = 0;
-            self.dropping = true;
+            self.begin_dropping(now);
         }
         if idle {
             self.dropping = false;
@@ -117,10 +137,21 @@ impl Receiver {
     /// [taken](Self::take) one by one. Nothing is copied.
     #[inline]
     pub(crate) fn whole<'a>(&self, octets: &'a [u8]) -> Option<Telegram<'a>> {
-        if self.dropping || self.filled > 0 {
+        if self.dropping {
+            return self.whole_at_last(octets);
+        }
+        if self.filled > 0 {
             return None;
         }
         Telegram::decode(octets).ok().flatten()
+    }
+
+    /// On a busy bus there may never be a pause of a millisecond. After 50 ms without one, a port that
+    /// knows no bit times takes octets that are one telegram from the first to the last (decision).
+    #[cold]
+    fn whole_at_last<'a>(&self, octets: &'a [u8]) -> Option<Telegram<'a>> {
+        let telegram = Telegram::decode(octets).ok().flatten().filter(|_| self.impatient)?;
+        (telegram.length() == octets.len()).then_some(telegram)
     }
 
     /// Takes octets that [`arrive`](Self::arrive) announced, up to the end of the first telegram,
@@ -138,7 +169,7 @@ impl Receiver {
                 Ok(None) => length_of(begun).unwrap_or_default(),
                 Err(_) => {
                     self.filled = 0;
-                    self.dropping = true;
+                    self.begin_dropping(self.last.unwrap_or_default());
                     return (octets.len(), Received::Broken);
                 }
             };
@@ -164,6 +195,7 @@ impl Receiver {
     #[inline]
     pub(crate) fn end_telegram(&mut self) -> bool {
         self.filled = 0;
+        self.dropping = false;
         let coarse = self.timing == Timing::Coarse;
         core::mem::replace(&mut self.after_idle, coarse)
     }

@@ -1,6 +1,7 @@
 //! Chk_Cfg: which configurations lead where.
 
 use codewheel_profibus::{Event, Loss, State};
+use codewheel_station::Duration;
 
 use crate::bench::{Bench, RS, SC, telegram};
 
@@ -74,4 +75,21 @@ fn after_refused_parameters_their_master_gets_its_configuration_acknowledged_unl
     // Up to the next Set_Prm, of whomever.
     bench.asks(3, Some(61), "C0 00 00 00 12 34 00", SC);
     bench.asks(2, Some(62), "F1", RS);
+}
+
+#[test]
+fn an_old_refusal_does_not_outlive_good_parameters() {
+    let mut bench = Bench::power_up();
+    bench.asks(2, Some(61), "80 00 00 00 12 34 00", SC);
+    let mut bench = bench.then_exchanging();
+    bench.wait(Duration::from_millis(200));
+    bench.asks(2, Some(62), "F1", RS);
+}
+
+#[test]
+fn cfg_fault_does_not_outlive_a_refused_set_prm() {
+    let mut bench = Bench::parameterized();
+    bench.asks(2, Some(62), "F2", SC);
+    bench.asks(2, Some(61), "80 00 00 00 12 34 00", SC);
+    assert_eq!(bench.diagnosis(), "42 05 00 FF 05 9B 02 00");
 }

@@ -1,10 +1,10 @@
 //! Broken telegrams, and how the slave finds back.
 
 use codewheel_profibus::{Baud, Timing};
-use codewheel_station::Duration;
 use codewheel_station::rs485::{BaudRate, Input};
+use codewheel_station::{Duration, Instant};
 
-use crate::bench::{Bench, octets};
+use crate::bench::{Bench, GOOD_PARAMETERS, RS, SC, octets, telegram};
 
 const FDL_STATUS: &str = "10 07 02 49 52 16";
 const ANSWER: &str = "10 02 07 00 09 16";
@@ -161,4 +161,49 @@ fn a_broken_character_breaks_the_telegram_it_stands_in() {
         bench.wait(Duration::from_millis(1));
         bench.says(FDL_STATUS, ANSWER);
     }
+}
+
+#[test]
+fn on_a_pc_one_broken_octet_does_not_make_the_slave_deaf_on_a_busy_bus() {
+    let mut bench = Bench::on_a_pc();
+    bench.hears("17");
+    let mut answers = 0;
+    for _ in 0..10_000 {
+        // A master that polls another slave, and then us; 0.4 ms of silence each time.
+        bench.hears_after(60, &octets(&telegram(8, 2, 0x49, None, "")));
+        bench.hears_after(60, &octets(&telegram(2, 8, 0x00, None, "")));
+        bench.hears_after(60, &octets(FDL_STATUS));
+        let sent = bench.sends(bench.slave.baud_rate().bits(200));
+        answers += sent.len();
+    }
+    assert!(
+        answers > 0,
+        "deaf for {} s",
+        bench.now.since(Instant::from_nanos(1_000_000_000)).as_millis() / 1000
+    );
+}
+
+#[test]
+fn with_bit_times_a_master_clock_that_is_a_little_slow_does_not_break_long_pieces() {
+    let mut bench = Bench::new(Baud::Fixed(BaudRate::Mbit1_5), Timing::Exact);
+    let request = octets(&telegram(7, 2, 0x6C, Some((55, 62)), &"00 ".repeat(200)));
+    bench.hears_after(40, &request[..10]);
+    let rest = &request[10..];
+    let nanos = bench.slave.baud_rate().characters(rest.len() as u32).as_nanos();
+    bench.wait(Duration::from_nanos(nanos + nanos * 3 / 1000));
+    bench.slave.handle(bench.now, Input::Octets(rest), &mut bench.toy);
+    assert_eq!(bench.answer(), RS);
+}
+
+#[test]
+fn with_bit_times_a_master_clock_that_is_a_little_fast_still_leaves_an_idle_line() {
+    let mut bench = Bench::power_up();
+    bench.hears("DC 02 02");
+    let request =
+        octets(&bench.request(2, Some(61), &format!("{GOOD_PARAMETERS} {}", "00 ".repeat(17))));
+    let bits = 33 + request.len() as u32 * 11;
+    let nanos = bench.slave.baud_rate().bits(bits).as_nanos();
+    bench.wait(Duration::from_nanos(nanos - nanos * 3 / 1000));
+    bench.slave.handle(bench.now, Input::Octets(&request), &mut bench.toy);
+    assert_eq!(bench.answer(), SC);
 }

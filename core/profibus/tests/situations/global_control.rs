@@ -2,7 +2,7 @@
 
 use codewheel_profibus::State;
 
-use crate::bench::{Bench, RS, telegram};
+use crate::bench::{Bench, GOOD_PARAMETERS, RS, SC, telegram};
 
 const CLEAR: u8 = 0x02;
 const UNFREEZE: u8 = 0x04;
@@ -195,4 +195,51 @@ fn what_is_no_whole_global_control_is_ignored() {
     let mut bench = Bench::exchanging();
     bench.says(&telegram(7, 2, 0x7D, Some((58, 62)), "20 00"), RS);
     assert!(!bench.slave.is_in_sync_mode(), "as a request for data");
+}
+
+#[test]
+fn others_read_transferred_outputs_and_frozen_inputs() {
+    let mut bench = Bench::exchanging();
+    bench.exchanges("00 00 00 01", "00 00 12 34", &["00 00 00 01"]);
+    bench.global_control(2, 0x28, 0);
+    bench.toy.inputs = [9; 4];
+    bench.exchanges("00 00 00 02", "00 00 12 34", &[]);
+    bench.asks(3, Some(57), "", &telegram(3, 7, 8, Some((62, 57)), "00 00 00 01"));
+    bench.asks(3, Some(56), "", &telegram(3, 7, 8, Some((62, 56)), "00 00 12 34"));
+    // The same configuration again changes nothing, another one thaws.
+    bench.asks(2, Some(62), "F1", SC);
+    bench.asks(3, Some(56), "", &telegram(3, 7, 8, Some((62, 56)), "00 00 12 34"));
+    bench.asks(2, Some(62), "D1", SC);
+    bench.asks(3, Some(56), "", &telegram(3, 7, 8, Some((62, 56)), "09 09 09 09"));
+}
+
+#[test]
+fn after_a_clear_in_sync_mode_a_sync_transfers_zeros() {
+    let mut bench = Bench::exchanging();
+    bench.global_control(2, 0x20, 0);
+    bench.exchanges("80 00 00 02", "00 00 12 34", &[]);
+    bench.global_control(2, 0x02, 0);
+    bench.toy.told.clear();
+    bench.global_control(2, 0x20, 0);
+    assert_eq!(bench.toy.told, ["00 00 00 00"]);
+    bench.exchanges("", "00 00 12 34", &["clear"]);
+    assert!(bench.slave.is_in_sync_mode());
+}
+
+#[test]
+fn a_second_sync_without_new_outputs_transfers_the_same() {
+    let mut bench = Bench::exchanging();
+    bench.exchanges("80 00 00 05", "00 00 12 34", &["80 00 00 05"]);
+    bench.toy.told.clear();
+    bench.global_control(2, 0x20, 0);
+    bench.global_control(2, 0x20, 0);
+    assert_eq!(bench.toy.told, ["80 00 00 05"]);
+}
+
+#[test]
+fn good_parameters_end_sync_and_freeze_at_once() {
+    let mut bench = Bench::exchanging();
+    bench.global_control(2, 0x28, 0);
+    let mut bench = bench.then_parameterized(GOOD_PARAMETERS);
+    assert_eq!(bench.diagnosis(), "02 0C 00 02 05 9B 02 00");
 }

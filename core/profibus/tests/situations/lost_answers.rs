@@ -1,5 +1,7 @@
 //! Retries: what is repeated, and what only looks like a retry.
 
+use codewheel_station::Duration;
+
 use crate::bench::{Bench, SC, hex, octets, telegram};
 
 const FIRST: &str = "68 07 07 68 07 02 7D 00 00 00 05 8B 16";
@@ -138,4 +140,42 @@ fn the_longest_request_is_remembered_whole() {
     bench.says(&request("02"), SC);
     assert_eq!(bench.slave.counters().retries, 1);
     assert_eq!(bench.toy.events.len(), 2, "parameterized twice");
+}
+
+#[test]
+fn a_retry_after_the_watchdog_and_a_new_bring_up_is_new() {
+    let mut bench = Bench::exchanging();
+    let request = telegram(7, 2, 0x7D, None, "00 00 00 05");
+    bench.says(&request, &telegram(2, 7, 8, None, "00 00 12 34"));
+    bench.wait(Duration::from_millis(200));
+    let mut bench = bench.then_exchanging();
+    bench.says(&request, &telegram(2, 7, 8, None, "00 00 12 34"));
+    assert_eq!(bench.toy.told, ["00 00 00 05"]);
+    // A replay retriggers, and its DH is the stored one.
+    for _ in 0..10 {
+        bench.wait(Duration::from_millis(150));
+        bench.says(&request, &telegram(2, 7, 8, None, "00 00 12 34"));
+    }
+}
+
+#[test]
+fn fdl_status_is_never_a_retry() {
+    let mut bench = Bench::exchanging();
+    for code in [0x49, 0x59, 0x69, 0x79] {
+        let request = telegram(7, 2, code, None, "");
+        bench.says(&request, "10 02 07 00 09 16");
+        bench.says(&request, "10 02 07 00 09 16");
+    }
+    assert_eq!(bench.slave.counters().retries, 0);
+}
+
+#[test]
+fn a_retry_with_frame_count_bit_0_executes_nothing_either() {
+    let mut bench = Bench::exchanging();
+    let request = telegram(7, 2, 0x5D, None, "00 00 00 05");
+    bench.hears(&request);
+    bench.answer();
+    bench.hears(&request);
+    assert_eq!(bench.toy.told, ["00 00 00 05"]);
+    assert_eq!(bench.slave.counters().retries, 1);
 }

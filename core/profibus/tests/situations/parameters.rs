@@ -136,7 +136,11 @@ fn reserved_bits_are_ignored_and_noticed() {
     let bench = Bench::power_up().then_parameterized("87 00 00 00 05 9B 00 1B");
     assert_eq!(
         bench.toy.events,
-        [Event::Parameterized { master: 2 }, Event::ReservedStationStatus { bits: 7 }]
+        [
+            Event::Parameterized { master: 2 },
+            Event::ReservedStationStatus { bits: 7 },
+            Event::ReservedOperating { bits: 0x18 }
+        ]
     );
 }
 
@@ -154,4 +158,24 @@ fn a_stranger_can_neither_parameterize_nor_unlock_nor_configure() {
         let after = (bench.slave.state(), bench.slave.watchdog(), bench.slave.station_delay());
         assert_eq!((before, bench.slave.master()), (after, Some(2)));
     }
+}
+
+#[test]
+fn not_supported_shows_beside_another_fault() {
+    for set_prm in ["80 00 00 00 12 34 00 80", "88 00 01 00 05 9B 00 80"] {
+        let mut bench = Bench::power_up();
+        bench.asks(2, Some(61), set_prm, SC);
+        assert!(bench.diagnosis().starts_with("52"), "{set_prm}: {}", bench.diagnosis());
+    }
+}
+
+#[test]
+fn without_lock_and_unlock_the_owner_changes_the_station_delay_alone() {
+    let mut bench = Bench::exchanging();
+    bench.global_control(2, 0x28, 0);
+    bench.asks(2, Some(61), "38 00 00 64 FF FF FF E0", SC);
+    assert_eq!(bench.slave.station_delay(), 100);
+    assert!(bench.slave.is_in_sync_mode() && bench.slave.is_in_freeze_mode());
+    assert_eq!(bench.slave.watchdog(), Some(Duration::from_millis(200)));
+    assert_eq!(bench.diagnosis(), "00 3C 00 02 05 9B 02 00");
 }

@@ -2,7 +2,7 @@
 
 use codewheel_station::Duration;
 
-use crate::bench::{Bench, octets, telegram};
+use crate::bench::{Bench, GOOD_PARAMETERS, SC, octets, telegram};
 
 impl Bench {
     /// The function code of the answer to a Data_Exchange.
@@ -98,4 +98,17 @@ fn a_repeated_data_exchange_repeats_its_call_or_its_silence() {
     bench.toy.set_alarm(1);
     bench.says(&request, &answer);
     assert_eq!(bench.exchange_code(), 0x0A);
+}
+
+#[test]
+fn a_new_owner_is_called_for_an_alarm_that_only_the_old_one_has_read() {
+    let mut bench = Bench::exchanging();
+    bench.toy.set_alarm(1);
+    bench.diagnosis();
+    bench.wait(Duration::from_millis(200));
+    bench.asks(3, Some(61), GOOD_PARAMETERS, SC);
+    bench.asks(3, Some(62), "F1", SC);
+    let request = bench.request(3, None, "00 00 00 00");
+    bench.hears(&request);
+    assert_eq!(octets(&bench.answer())[6], 0x0A);
 }

@@ -1,6 +1,10 @@
 //! What is refused, and what is met with silence.
 
-use crate::bench::{Bench, RS, telegram};
+use codewheel_profibus::{Baud, Settings, Slave, Timing};
+use codewheel_station::Instant;
+use codewheel_station::rs485::{BaudRate, Input};
+
+use crate::bench::{Bench, RS, Toy, octets, telegram};
 
 #[test]
 fn services_the_slave_has_not_are_refused_in_every_state() {
@@ -58,4 +62,36 @@ fn a_stranger_is_refused_data_exchange_and_nothing_changes() {
     bench.asks(3, None, "80", "10 03 07 03 0D 16");
     assert_eq!(bench.toy.told, [""; 0]);
     bench.exchanges("00 00 00 00", "00 00 12 34", &["00 00 00 00"]);
+}
+
+#[test]
+fn any_address_answers_masters_at_0_to_125_but_its_own() {
+    for address in [0, 1, 99, 125] {
+        for master in 0..=127_u8 {
+            let baud = Baud::Fixed(BaudRate::Kbit500);
+            let mut slave = Slave::<4>::new(Settings {
+                address,
+                ident_number: 0x059B,
+                baud,
+                timing: Timing::Exact,
+            });
+            let mut toy = Toy::default();
+            let now = Instant::from_nanos(1_000_000_000);
+            slave.handle(
+                now,
+                Input::Octets(&octets(&telegram(address, master, 0x6D, Some((60, 62)), ""))),
+                &mut toy,
+            );
+            let later = now + BaudRate::Kbit500.bits(11);
+            let answer = slave.transmit(later, &mut toy);
+            assert_eq!(answer.is_some(), master <= 125 && master != address, "{address} {master}");
+        }
+    }
+}
+
+#[test]
+fn an_ssap_with_bit_7_is_swapped() {
+    let mut bench = Bench::power_up();
+    let answer = telegram(2, 7, 8, Some((0xFE, 59)), "F1");
+    bench.says(&telegram(7, 2, 0x6D, Some((59, 0xFE)), ""), &answer);
 }

@@ -1,9 +1,10 @@
 //! The watchdog over the master.
 
-use codewheel_profibus::{Event, Loss, State};
+use codewheel_profibus::{Baud, Event, Loss, State, Timing};
+use codewheel_station::rs485::{BaudRate, Input};
 use codewheel_station::{Duration, Instant};
 
-use crate::bench::{Bench, SC, telegram};
+use crate::bench::{Bench, RS, SC, octets, telegram};
 
 const NANO: Duration = Duration::from_nanos(1);
 
@@ -151,4 +152,34 @@ fn off_means_off() {
     bench.wait(Duration::from_secs(1_000_000));
     assert_eq!(bench.slave.state(), State::DataExchange);
     bench.asks(2, Some(61), "80 01 01 00 05 9B 00", SC);
+}
+
+#[test]
+fn the_acknowledge_of_set_prm_leaves_though_its_own_watchdog_is_shorter_than_t_sdr() {
+    let mut bench = Bench::new(Baud::Fixed(BaudRate::Kbit9_6), Timing::Exact);
+    let request = bench.request(2, Some(61), "88 01 01 FF 05 9B 00 04");
+    bench.says(&request, SC);
+}
+
+#[test]
+fn a_request_that_ends_with_the_watchdog_time_is_too_late() {
+    let mut bench = Bench::exchanging();
+    let request = bench.request(2, None, "00 00 00 00");
+    // Its end falls on the very instant of the expiry: too late.
+    let length = bench.slave.baud_rate().characters(octets(&request).len() as u32);
+    let due = bench.slave.deadline().expect("watchdog");
+    let pause = due.since(bench.now).as_nanos() - length.as_nanos();
+    bench.wait(Duration::from_nanos(pause));
+    bench.hears_after(0, &octets(&request));
+    assert_eq!(bench.answer(), RS);
+}
+
+#[test]
+fn a_request_after_the_expiry_finds_the_watchdog_expired_without_a_call_of_advance() {
+    let mut bench = Bench::exchanging();
+    let request = octets(&bench.request(2, None, "00 00 00 05"));
+    bench.now += Duration::from_millis(201);
+    bench.slave.handle(bench.now, Input::Octets(&request), &mut bench.toy);
+    assert_eq!(bench.answer(), RS);
+    assert_eq!(bench.toy.told, [""; 0]);
 }
