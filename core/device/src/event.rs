@@ -48,7 +48,7 @@ pub enum Event {
     Restored,
     /// The defaults were loaded.
     Reset,
-    /// The memory did not take a record, or not within 5 s.
+    /// The memory did not take a record; a Save on DeviceNet is given up after 5 s without a word.
     KeepFailed,
     /// Both records in memory are damaged: the device runs with the defaults.
     MemoryDamaged,

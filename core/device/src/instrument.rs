@@ -1,7 +1,7 @@
 //! What a device is on any bus: a sensor, the encoder behind it, and what happened to them.
 
 use codewheel_encoder::ssi::LineFault;
-use codewheel_encoder::{Encoder, Sensor};
+use codewheel_encoder::{DEFAULT_SPEED_LIMIT, Encoder, Sensor};
 use codewheel_station::{Deadline, Duration, Instant};
 
 use crate::Product;
@@ -20,6 +20,8 @@ pub(crate) struct Instrument<S, E> {
     pub(crate) powered_at: Instant,
     /// When the shaft must be looked at; never while it rests.
     pub(crate) next_sample: Deadline,
+    /// In turns a minute; above it two samples are a position error.
+    speed_limit: u32,
     /// What was told last.
     told: Complaints,
 }
@@ -58,6 +60,7 @@ impl<S: Sensor, E: Copy + From<Happening>> Instrument<S, E> {
             events,
             powered_at: now,
             next_sample: Deadline::NEVER,
+            speed_limit: DEFAULT_SPEED_LIMIT,
             told: Complaints::default(),
         }
     }
@@ -65,8 +68,15 @@ impl<S: Sensor, E: Copy + From<Happening>> Instrument<S, E> {
     /// The power is there again, and with it `encoder`.
     pub(crate) fn restart(&mut self, now: Instant, encoder: Encoder) {
         self.encoder = encoder;
+        self.encoder.set_speed_limit(self.speed_limit);
         self.powered_at = now;
         self.told = Complaints::default();
+    }
+
+    /// How fast the shaft can turn; it outlasts the power.
+    pub(crate) fn set_speed_limit(&mut self, rpm: u32) {
+        self.speed_limit = rpm;
+        self.encoder.set_speed_limit(rpm);
     }
 
     /// The sensor, to be changed: it is looked at as soon as there is time.

@@ -131,6 +131,11 @@ impl Upkeep {
         self.due = true;
     }
 
+    /// What is asked for is new, so it does not wait until one that has failed is tried again.
+    pub(crate) const fn hurry(&mut self) {
+        self.retry_at = Deadline::NEVER;
+    }
+
     /// Whether a record is on its way into memory.
     pub(crate) const fn is_writing(&self) -> bool {
         self.writing

@@ -147,11 +147,13 @@ impl Receiver {
     }
 
     /// On a busy bus there may never be a pause of a millisecond. After 50 ms without one, a port that
-    /// knows no bit times takes octets that are one telegram from the first to the last (decision).
+    /// knows no bit times takes octets that are one telegram with a checksum from the first to the
+    /// last (decision).
     #[cold]
     fn whole_at_last<'a>(&self, octets: &'a [u8]) -> Option<Telegram<'a>> {
         let telegram = Telegram::decode(octets).ok().flatten().filter(|_| self.impatient)?;
-        (telegram.length() == octets.len()).then_some(telegram)
+        let is_sure = matches!(telegram, Telegram::Data(_)) && telegram.length() == octets.len();
+        is_sure.then_some(telegram)
     }
 
     /// Takes octets that [`arrive`](Self::arrive) announced, up to the end of the first telegram,

@@ -32,6 +32,8 @@ pub(super) struct Body<S> {
     is_short: bool,
     /// The clock bit of the preset was seen 0, so its next 1 is a rise.
     clock_is_low: bool,
+    /// No outputs have come yet in this data exchange.
+    begins: bool,
     /// Settings came into force before the shaft was seen; where their turns begin is not settled.
     turns_await_sample: bool,
     /// The alarm and the warning as the diagnosis shows them.
@@ -71,6 +73,7 @@ impl<S: Sensor> Body<S> {
             has_error: false,
             is_short: false,
             clock_is_low: false,
+            begins: false,
             turns_await_sample: false,
             shown: (false, false),
             version: 0,
@@ -235,9 +238,23 @@ impl<S: Sensor> Body<S> {
         }
     }
 
+    /// The inputs show no handshake, so only this tells why a preset does nothing.
+    #[cold]
+    fn first_outputs(&mut self, now: Instant, clock: bool) {
+        self.begins = false;
+        if clock && self.class_2 {
+            self.tell(now, Event::Remark(Remark::ClockBitSet));
+        }
+    }
+
     /// The preset function (PROFIBUS manual §7.4), at the position of this very moment.
     fn preset(&mut self, now: Instant, value: u32) {
         self.sample(now);
+        if self.encoder().line_fault().is_some() {
+            // An offset made of a position that is only held would be wrong for good.
+            self.refuse(now, Refusal::NoPosition);
+            return;
+        }
         match self.instrument.encoder.set_preset(value) {
             Ok(()) => {
                 self.preset_refused = false;
@@ -322,6 +339,7 @@ impl<S: Sensor> Application for Body<S> {
         self.has_error = false;
         // Decision: a clock bit that is set already, as after a restart of the master, is no rise.
         self.clock_is_low = false;
+        self.begins = true;
     }
 
     #[inline]
@@ -340,6 +358,9 @@ impl<S: Sensor> Application for Body<S> {
         let Some((clock, value)) = clock_and_value(octets) else { return };
         let rises = clock && self.clock_is_low;
         self.clock_is_low = !clock;
+        if self.begins {
+            self.first_outputs(now, clock);
+        }
         if rises && self.class_2 {
             self.preset(now, value);
         }

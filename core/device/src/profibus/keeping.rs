@@ -133,6 +133,9 @@ impl Keeping {
     /// Decision: a preset that finds its offset in memory is not written, so that one repeated in
     /// every cycle wears nothing out.
     pub(super) fn keep_preset(&mut self, block: &Block) {
+        if self.written.preset != *block {
+            self.upkeep.hurry();
+        }
         self.wanted.preset = *block;
         self.has_preset = true;
         self.ask();

@@ -102,6 +102,12 @@ impl<S: Sensor> ProfibusEncoder<S> {
         self.body.instrument.sensor_mut()
     }
 
+    /// Sets the speed above which two samples are a position error, in turns a minute; 12 000 where
+    /// it was never set (decision). A constant of the factory, so it outlasts the power.
+    pub fn set_speed_limit(&mut self, rpm: u32) {
+        self.body.instrument.set_speed_limit(rpm);
+    }
+
     /// Where the switches stand.
     #[must_use]
     pub const fn switches(&self) -> Switches {

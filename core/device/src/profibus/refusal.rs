@@ -49,7 +49,8 @@ pub enum Refusal {
         /// T−1.
         max: u32,
     },
-    /// There is no position to preset: the SSI line has brought no word since power-up.
+    /// There is no position to preset: the SSI line has brought no word since power-up, or it is at
+    /// fault and the position is only held (decision).
     NoPosition,
 }
 
@@ -77,6 +78,8 @@ pub enum Remark {
     },
     /// The configuration carries presets, and class 2 is off.
     PresetsIgnored,
+    /// The clock bit of the preset is set since the beginning of the data exchange.
+    ClockBitSet,
     /// The offset kept in memory belongs to these parameters and is in force.
     OffsetInForce {
         /// The offset in steps.
@@ -111,7 +114,13 @@ impl Refusal {
 impl Remark {
     /// Whether the data that the master gets, or its presets, are not what it may expect.
     pub(crate) const fn is_trouble(self) -> bool {
-        matches!(self, Self::OneWord { .. } | Self::PresetsIgnored | Self::ScalingWithoutClass2)
+        matches!(
+            self,
+            Self::OneWord { .. }
+                | Self::PresetsIgnored
+                | Self::ClockBitSet
+                | Self::ScalingWithoutClass2
+        )
     }
 }
 
@@ -165,7 +174,7 @@ impl fmt::Display for Refusal {
             }
             Self::Preset { given, max } => write!(f, "{given} is not 0 to {max}"),
             Self::NoPosition => {
-                f.write_str("the SSI line has brought no position yet that could be preset")
+                f.write_str("the SSI line brings no position now that could be preset")
             }
         }
     }
@@ -199,6 +208,9 @@ impl fmt::Display for Remark {
             Self::OneWord { bits } => {
                 write!(f, "position needs {bits} bits, 16 are sent: choose two words")
             }
+            Self::ClockBitSet => f.write_str(
+                "the clock bit of the preset is set since the start: send it as 0 first",
+            ),
             Self::PresetsIgnored => {
                 f.write_str("presets are ignored: class 2 is off (Set_Prm octet 9 bit 1)")
             }

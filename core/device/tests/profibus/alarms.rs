@@ -1,7 +1,12 @@
 //! The alarm: position errors and presets out of range (PROFIBUS manual §7.1; encoder clause 3).
 
-use codewheel_device::Event;
-use codewheel_station::Duration;
+use codewheel_device::profibus::{Factory, Switches};
+use codewheel_device::{Event, Product, ProfibusEncoder};
+use codewheel_encoder::Start;
+use codewheel_profibus::{Baud, Timing};
+use codewheel_sim::shaft::Shaft;
+use codewheel_station::rs485::BaudRate;
+use codewheel_station::{Duration, Instant, Station};
 
 use crate::bench::{Bench, EXAMPLE, FULL_RANGE};
 
@@ -135,4 +140,43 @@ fn a_power_cycle_ends_every_alarm() {
     assert!(!bench.snapshot().alarm && !bench.state().preset_refused);
     bench.brings_up(EXAMPLE, 0xF1);
     assert_eq!(seen(&mut bench), (0x08, "0000".into()));
+}
+
+#[test]
+fn a_jump_that_only_the_diagnosis_has_seen_is_an_alarm() {
+    let mut bench = Bench::power_up("amg11-p29").running(FULL_RANGE);
+    bench.device.sensor_mut().turning = true;
+    bench.wait(Duration::from_millis(10));
+    bench.device.sensor_mut().code = 1_000_000;
+    let diagnosis = bench.diagnosis();
+    assert_eq!((diagnosis[0], diagnosis[7]), (0x08, 1));
+}
+
+/// The shaft turns at 120 rpm; the alarm is raised between two looks a millisecond apart.
+#[test]
+fn the_speed_limit_can_be_set_and_outlasts_the_power() {
+    let product = Product::find("amg11-p29").expect("in the catalogue");
+    let factory = Factory {
+        model: product.encoder,
+        serial: 1,
+        baud: Baud::Fixed(BaudRate::Mbit1_5),
+        timing: Timing::Exact,
+    };
+    let shaft = Shaft::parse("turn rpm=120", 8_192, 65_536).expect("a shaft");
+    let start = Start::Fresh { interrupted: false };
+    let switches = Switches::set_to(7);
+    let mut now = Instant::ZERO;
+    let mut device = ProfibusEncoder::power_up(now, product, factory, switches, &start, shaft);
+    let alarm_after_a_while = |device: &mut ProfibusEncoder<Shaft>, now: &mut Instant| {
+        for _ in 0..20 {
+            *now += Duration::from_millis(1);
+            device.advance(*now);
+        }
+        device.snapshot(*now).alarm
+    };
+    assert!(!alarm_after_a_while(&mut device, &mut now), "12 000 rpm are far away");
+    device.set_speed_limit(60);
+    assert!(alarm_after_a_while(&mut device, &mut now));
+    device.power_cycle(now);
+    assert!(alarm_after_a_while(&mut device, &mut now));
 }

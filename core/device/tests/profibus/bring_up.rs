@@ -195,3 +195,13 @@ fn what_the_shaft_shows_at_power_up_is_no_alarm() {
     bench.brings_up("00", 0xD1);
     assert_eq!(bench.exchanges(""), (0x08, "075BCD15".into()));
 }
+
+#[test]
+fn reserved_bits_of_octet_8_are_told() {
+    let mut bench = Bench::power_up("amg11-p29");
+    bench.events();
+    let answer = bench.asks(0x3D, &octets_of("88 01 C8 0B 05 9B 00 18 00"));
+    assert_eq!(answer.as_deref(), Some("E5"));
+    let told = bench.told();
+    assert!(told.iter().any(|text| text.contains("octet 8")), "{told:?}");
+}

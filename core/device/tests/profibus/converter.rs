@@ -157,3 +157,15 @@ fn a_line_that_is_dead_at_power_up_loses_no_reference() {
     assert_eq!(bench.position("00000000"), other);
     assert_eq!(position, 65_537 * 3_600 % 360_000);
 }
+
+#[test]
+fn a_preset_during_a_line_fault_is_not_made_of_the_held_position() {
+    let mut bench = Bench::power_up("heag162-p29").running(FULL_RANGE);
+    bench.turn_to(5_000);
+    bench.position("00000000");
+    bench.device.sensor_mut().reading = Reading::Failed(LineFault::StuckHigh);
+    bench.device.sensor_mut().code = 77_000;
+    bench.position("00000000");
+    bench.position("80000000");
+    assert_eq!(bench.writes(), 0, "a wrong offset went into memory");
+}

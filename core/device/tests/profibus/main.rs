@@ -8,6 +8,7 @@ mod converter;
 mod diagnosis;
 mod lamp;
 mod memory;
+mod moment;
 mod power_cuts;
 mod presets;
 mod refused;

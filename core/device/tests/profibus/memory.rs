@@ -1,11 +1,11 @@
 //! What survives without power, and how often it is written (encoder clauses 2 and 4).
 
 use codewheel_device::{Event, MemoryState};
-use codewheel_encoder::Slot;
+use codewheel_encoder::{RECORD_OCTETS, Slot, encode};
 use codewheel_sim::memory::TornMemory;
-use codewheel_station::Duration;
+use codewheel_station::{Duration, Station};
 
-use crate::bench::{Bench, EXAMPLE, FULL_RANGE, Hand};
+use crate::bench::{Bench, EXAMPLE, FULL_RANGE, Hand, start};
 
 /// 3600 steps in 256 turns, position 100 at code 8192.
 fn preset() -> Bench {
@@ -172,4 +172,67 @@ fn a_power_cycle_starts_with_what_is_in_memory_or_on_its_way_there() {
     bench.brings_up(EXAMPLE, 0xF1);
     assert_eq!(bench.position("00000000"), 101);
     assert_eq!(bench.snapshot().saved.preset, 101);
+}
+
+#[test]
+fn a_new_preset_after_a_failed_write_is_written_at_once() {
+    let mut bench = Bench::power_up("amg11-p29").running(EXAMPLE);
+    bench.serves_memory = false;
+    bench.position("00000000");
+    bench.position("80000064");
+    bench.device.keep(bench.now).expect("a record");
+    bench.device.kept(bench.now, Err("busy"));
+    bench.position("00000000");
+    bench.position("80000065");
+    assert!(bench.device.keep_due(bench.now), "the second preset waits for the retry of the first");
+}
+
+#[test]
+fn of_two_presets_while_the_memory_is_busy_both_are_written_in_turn() {
+    let mut bench = Bench::power_up("amg11-p29").running(EXAMPLE);
+    bench.serves_memory = false;
+    bench.position("00000000");
+    bench.position("80000064");
+    let first = bench.device.keep(bench.now).expect("first");
+    bench.brings_up(FULL_RANGE, 0xF1);
+    bench.position("00000000");
+    bench.position("80000009");
+    bench.device.kept(bench.now, Ok::<(), ()>(()));
+    let second = bench.device.keep(bench.now).expect("second");
+    assert_eq!((first.saved.preset, second.saved.preset), (0x64, 9));
+    assert_ne!(first.saved.settings, second.saved.settings);
+}
+
+#[test]
+fn a_failed_write_wakes_the_host() {
+    let mut bench = Bench::power_up("amg11-p29").running(EXAMPLE);
+    bench.serves_memory = false;
+    bench.position("00000000");
+    bench.position("80000064");
+    bench.device.keep(bench.now).expect("a record");
+    bench.device.kept(bench.now, Err("busy"));
+    bench.wait(Duration::from_secs(10));
+    let deadline = bench.device.deadline().expect("a retry");
+    assert!(deadline > bench.now && deadline.since(bench.now) <= Duration::from_secs(60));
+}
+
+#[test]
+fn a_preset_that_goes_back_while_the_memory_is_busy_is_what_is_kept() {
+    let mut bench = Bench::power_up("amg11-p29").running(EXAMPLE);
+    bench.serves_memory = false;
+    bench.position("00000000");
+    bench.position("80000064");
+    bench.serve_memory();
+    bench.position("00000000");
+    bench.position("80000065");
+    let under_way = bench.device.keep(bench.now).expect("101");
+    bench.position("00000000");
+    bench.position("80000064");
+    let (slot, sequence) = start(&bench.memory).next();
+    let octets: [u8; RECORD_OCTETS] = encode(&under_way, sequence);
+    bench.memory.write(slot, &octets, None);
+    bench.device.kept(bench.now, Ok::<(), ()>(()));
+    bench.serve_memory();
+    let mut bench = bench.power_cycled(0).running(EXAMPLE);
+    assert_eq!(bench.position("00000000"), 100);
 }

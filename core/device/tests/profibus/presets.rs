@@ -177,3 +177,23 @@ fn a_telegram_that_is_repeated_presets_once() {
     bench.hears(&other);
     assert_eq!(bench.device.encoder().position(), 100);
 }
+
+#[test]
+fn a_clock_bit_that_is_set_at_entry_is_told() {
+    let mut bench = Bench::power_up("amg11-p29").running(FULL_RANGE);
+    bench.events();
+    bench.position("80000005");
+    let told = bench.told();
+    assert!(!told.is_empty(), "a preset was ignored in silence");
+}
+
+#[test]
+fn a_preset_in_the_telegram_of_a_jump_counts_from_the_new_code() {
+    let mut bench = Bench::power_up("amg11-p29").running(FULL_RANGE);
+    bench.device.sensor_mut().turning = true;
+    bench.wait(Duration::from_millis(10));
+    bench.position("00000000");
+    bench.device.sensor_mut().code = 1_000_000;
+    let (reply, inputs) = bench.exchanges("80000007");
+    assert_eq!((reply, inputs.as_str()), (0x0A, "00000007"));
+}

@@ -117,3 +117,47 @@ fn a_singleturn_disc_keeps_no_turns() {
     let mut bench = bench.power_cycled(1_000).running("0A 00002000 00000BB8");
     assert_eq!(bench.position("00000000"), 1_000);
 }
+
+#[test]
+fn turns_counted_in_class_1_are_there_when_class_2_comes_back() {
+    for octets in [HUNDRED_TURNS, "0B 00000E10 00057E40"] {
+        for preset in [false, true] {
+            let mut bench = Bench::power_up("amg11-p29").running(octets);
+            bench.turn_to(8_192);
+            bench.position("00000000");
+            if preset {
+                bench.position("80000064");
+            }
+            let before = i64::from(bench.position("00000000"));
+            bench.brings_up("00", 0xD1);
+            for quarter in 1..=4 {
+                bench.turn_to((RANGE / 4 * quarter) & (RANGE - 1));
+                bench.exchanges("");
+            }
+            bench.turn_to(3 * 8_192);
+            bench.exchanges("");
+            bench.brings_up(octets, 0xF1);
+            let sign = if octets.starts_with("0B") { -1 } else { 1 };
+            let moved = sign * (65_536 + 2) * 3_600;
+            let after = i64::from(bench.position("00000000"));
+            assert_eq!(after, (before + moved).rem_euclid(360_000), "{octets} {preset}");
+            let mut bench = bench.power_cycled(3 * 8_192).running(octets);
+            assert_eq!(i64::from(bench.position("00000000")), after, "{octets} {preset} power");
+        }
+    }
+}
+
+#[test]
+fn a_preset_under_settings_with_turns_keeps_their_reference() {
+    let mut bench = Bench::power_up("amg11-p29").running(HUNDRED_TURNS);
+    bench.turn_to(8_192);
+    bench.position("00000000");
+    bench.position("80000000");
+    for quarter in 1..=4 {
+        bench.turn_to((RANGE / 4 * quarter) & (RANGE - 1));
+        bench.exchanges("00000000");
+    }
+    let before = bench.position("00000000");
+    let mut bench = bench.power_cycled(0).running(HUNDRED_TURNS);
+    assert_eq!(bench.position("00000000"), before);
+}
