@@ -54,9 +54,10 @@ def play(program: Path, seconds: float) -> str:
 
 
 def last_table(written: str) -> list[str]:
-    """The lines of the last whole table, without control sequences."""
+    """The lines of the last whole table and of the buses below it, without control sequences."""
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", written)
-    tables = re.findall(r"┌[^┌]*?┘\s+[^┌\n]*? s\r?\n", plain)
+    # What is followed by another table has been drawn to its end.
+    tables = re.findall(r"┌[^┌]*?┘(?:\s+[^┌\n]* · [^┌\n]*)+(?=\s+┌)", plain)
     if not tables:
         raise SystemExit("the program has drawn no table")
     return [line.rstrip() for line in tables[-1].splitlines()]
@@ -113,7 +114,7 @@ def picture(lines: list[str]) -> str:
     return "\n".join([
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}"'
         f' width="{width:.0f}" height="{height:.0f}" role="img">',
-        "<title>The demo of codewheel: three encoders and the scanner that polls them</title>",
+        "<title>The demo of codewheel: three encoders on DeviceNet, three on PROFIBUS</title>",
         "<style>text{font:13px ui-monospace,SFMono-Regular,Menlo,Consolas,'DejaVu Sans Mono',"
         "monospace;fill:#e6edf3}.head{fill:#7ee787;font-weight:bold}.bar{fill:#9aa4af}"
         "path{fill:none;stroke:#57606a}</style>",

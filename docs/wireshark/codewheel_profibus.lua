@@ -151,8 +151,8 @@ end
 
 local function add_ident(tree, range, address, state)
   tree:add(f.ident, range)
-  state.ident = state.ident or range:uint()
-  if not state.visited then idents[address] = range:uint() end
+  state.ident = range:uint()
+  if not state.visited then idents[address] = state.ident end
 end
 
 local function set_prm(tree, data, address, state)
@@ -314,7 +314,9 @@ end
 
 local function data_telegram(tree, buffer, pinfo, state, first, sum)
   local to, from = buffer(first, 1):uint() % 128, buffer(first + 1, 1):uint() % 128
-  local extended = buffer(first, 1):uint() >= 128 and buffer(first + 1, 1):uint() >= 128
+  local extended = buffer(first, 1):uint() >= 128
+  -- Both addresses are extended, or neither.
+  local is_half = extended ~= (buffer(first + 1, 1):uint() >= 128)
   local code = buffer(first + 2, 1):uint()
   local is_request = bit_is_set(code, 6)
   local name = (is_request and FUNCTIONS or REPLIES)[code % 16] or "reserved"
@@ -332,7 +334,10 @@ local function data_telegram(tree, buffer, pinfo, state, first, sum)
     fc:add(f.station, buffer(first + 2, 1), STATIONS[math.floor(code / 16) % 4])
   end
   local begin, service = first + 3, nil
-  if extended and sum - begin >= 2 then
+  is_half = is_half or extended and sum - begin < 2
+  if is_half then
+    tree:add_proto_expert_info(broken, "Half of an address extension")
+  elseif extended then
     local dsap, ssap = buffer(begin, 1):uint(), buffer(begin + 1, 1):uint()
     tree:add(f.dsap, buffer(begin, 1))
     tree:add(f.ssap, buffer(begin + 1, 1))
@@ -342,12 +347,13 @@ local function data_telegram(tree, buffer, pinfo, state, first, sum)
   end
   local carries = name:find("^S[RD]") ~= nil
   if is_request then
-    if not service and carries then service = DATA_EXCHANGE end
+    if not service and carries and not is_half then service = DATA_EXCHANGE end
     if not state.visited then
-      local answered = to ~= 127 and name:find("^SDN") == nil
+      local answered = to ~= 127 and not is_half and FUNCTIONS[code % 16]
+        and name:find("^SDN") == nil
       asked = answered and { from = from, to = to, service = service or name } or nil
     end
-  elseif state.asked and state.asked.to == from and state.asked.from == to then
+  elseif not is_half and state.asked and state.asked.to == from and state.asked.from == to then
     service = service or state.asked.service
   end
   local address = is_request and to or from
