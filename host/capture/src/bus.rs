@@ -56,8 +56,8 @@ impl Bus {
     }
 }
 
-/// `name` as formats take it that separate words by blanks.
-fn word(name: &str) -> String {
+/// `name` as formats take it that separate words by blanks, and as a terminal can show it.
+pub(crate) fn word(name: &str) -> String {
     let joined: Vec<&str> = name.split(|c: char| c.is_whitespace() || c.is_control()).collect();
     let joined = joined.join("_");
     if joined.is_empty() { "bus".to_owned() } else { joined }

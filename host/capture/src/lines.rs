@@ -4,6 +4,8 @@ use std::io::{self, BufRead};
 
 /// The longest line that is looked at; the longest of a good file has less than a thousand octets.
 const LONGEST: usize = 16_384;
+/// What may stand before the first line of a text in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = "\u{FEFF}".as_bytes();
 
 /// Reads lines into one buffer, however long the file is.
 #[derive(Debug)]
@@ -71,7 +73,12 @@ impl<R: BufRead> Lines<R> {
 
     /// The line that was read last, without blanks around it.
     pub(crate) fn line(&self) -> &[u8] {
-        self.buffer.trim_ascii()
+        let line = match self.number {
+            // Editors of Windows put it there, and it is no part of the text.
+            1 => self.buffer.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&self.buffer),
+            _ => &self.buffer,
+        };
+        line.trim_ascii()
     }
 }
 

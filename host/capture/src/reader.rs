@@ -8,6 +8,7 @@ use std::path::Path;
 use codewheel_station::can::{Frame, Invalid};
 use thiserror::Error;
 
+use crate::bus::word;
 use crate::format::{MOST_BUSES, asc, log, pcapng, trc};
 use crate::lines::Lines;
 use crate::{Bus, Condition, Content, Direction, Format, FormatError, Medium, Record, Timestamp};
@@ -46,8 +47,8 @@ pub enum Damage {
     /// A version of the format that is not known.
     #[error("a version of the format that is not known")]
     Version,
-    /// The head does not say what is needed.
-    #[error("the head of the file does not say how to read it")]
+    /// The head does not say what is needed. Nothing behind it can be read.
+    #[error("the head of the file does not say how to read it; a .trc has a version, 1.1 or later")]
     Head,
     /// Another format than the suffix says.
     #[error("this is no pcapng")]
@@ -64,6 +65,14 @@ pub enum Damage {
     /// The last line has no end: nothing tells whether the frame has.
     #[error("the last line has no end, so it may have been cut off")]
     Cut,
+}
+
+impl Damage {
+    /// Whether nothing behind it can be read: in a pcapng nothing tells where the next block begins,
+    /// and without its head no line of a `.trc` has a meaning.
+    const fn ends_the_file(self) -> bool {
+        matches!(self, Self::Block | Self::Truncated | Self::NoPcapng | Self::Head)
+    }
 }
 
 impl From<Invalid> for Damage {
@@ -117,9 +126,7 @@ impl ReadError {
     #[must_use]
     pub const fn is_local(&self) -> bool {
         match self {
-            Self::Damage { damage, .. } => {
-                !matches!(damage, Damage::Block | Damage::Truncated | Damage::NoPcapng)
-            }
+            Self::Damage { damage, .. } => !damage.ends_the_file(),
             Self::Format(_) | Self::Io(_) => false,
         }
     }
@@ -266,16 +273,15 @@ impl<R: BufRead> Reader<R> {
             }
             Source::Pcapng(source, parser) => {
                 let found = parser.read(source, octets, buses);
-                // Behind a block that cannot be right nothing tells where the next one begins.
-                if let Ok(Err(Damage::Block | Damage::Truncated | Damage::NoPcapng)) = found {
-                    *over = true;
-                }
                 found.map(|found| (found, Place::Offset(parser.offset())))
             }
         };
         match result {
             Ok((Ok(found), _)) => Ok(found),
-            Ok((Err(damage), place)) => Err(ReadError::Damage { place, damage }),
+            Ok((Err(damage), place)) => {
+                *over = damage.ends_the_file();
+                Err(ReadError::Damage { place, damage })
+            }
             Err(error) => {
                 *over = true;
                 Err(error.into())
@@ -291,11 +297,20 @@ pub(crate) struct Buses(Vec<Bus>);
 impl Buses {
     /// The place of the bus that a line calls `name`.
     pub(crate) fn named(&mut self, name: &[u8], medium: Medium) -> Result<u16, Damage> {
-        let is = |bus: &Bus| bus.medium == medium && bus.name.as_bytes() == name;
-        match self.0.iter().position(is) {
-            Some(place) => Ok(place as u16),
-            None => self.add(Some(name), medium, None),
+        if let Some(place) = self.place(name, medium) {
+            return Ok(place);
         }
+        // What is no text, or would move a terminal's cursor, is called otherwise here.
+        let name = word(&String::from_utf8_lossy(name));
+        match self.place(name.as_bytes(), medium) {
+            Some(place) => Ok(place),
+            None => self.add(Some(name.as_bytes()), medium, None),
+        }
+    }
+
+    fn place(&self, name: &[u8], medium: Medium) -> Option<u16> {
+        let is = |bus: &Bus| bus.medium == medium && bus.name.as_bytes() == name;
+        self.0.iter().position(is).map(|place| place as u16)
     }
 
     /// The place of the bus that a line gives `number`, from 1 on, of a format that carries CAN
@@ -322,7 +337,7 @@ impl Buses {
             return Err(Damage::Bus);
         }
         let name = match name {
-            Some(name) => String::from_utf8_lossy(name).into_owned(),
+            Some(name) => word(&String::from_utf8_lossy(name)),
             None => format!("bus{}", place + 1),
         };
         self.0.push(Bus { name, medium, bits_per_second });

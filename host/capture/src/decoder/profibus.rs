@@ -97,7 +97,7 @@ impl Profibus {
             Some(Asked { from, to, what: What::Service(service), identifier }) => {
                 line.ends(Some(to), Some(from));
                 line.message("acknowledge");
-                line.attribute("service", &[service.name()]);
+                service.tell(line);
                 if let (Service::CheckConfiguration, Some(identifier)) = (service, identifier) {
                     line.hex("identifier", "identifier", &[identifier]);
                 }
@@ -205,10 +205,10 @@ impl Profibus {
             Ok(Some(saps)) => Some(Service::of(saps.source)),
             _ => None,
         };
-        let service = match what {
+        let service = by_sap.or(match what {
             Some(What::Service(service)) => Some(service),
-            _ => by_sap,
-        };
+            _ => None,
+        });
         match service {
             Some(service) => {
                 service.tell(line);

@@ -167,7 +167,6 @@ impl Parser {
         second: Option<&[u8]>,
     ) -> Result<Found, Damage> {
         let is = |word: &[u8], text: &str| word.eq_ignore_ascii_case(text.as_bytes());
-        let text = str::from_utf8(line).map_err(|_| Damage::Head)?;
         // The weekday says nothing new and stands in the language of the writer.
         let skip = match second {
             Some(second) if is(first, "begin") && is(second, "triggerblock") => 3,
@@ -179,7 +178,8 @@ impl Parser {
             }
             _ => return Ok(Found::Nothing),
         };
-        let date: Vec<&str> = text.split_whitespace().skip(skip).collect();
+        let date: Result<Vec<&str>, _> = words(line).skip(skip).map(str::from_utf8).collect();
+        let date = date.map_err(|_| Damage::Date)?;
         if date.is_empty() {
             return Ok(Found::Nothing);
         }

@@ -13,6 +13,8 @@ use crate::{Bus, Condition, Content, Direction, Medium, Record, Timestamp};
 
 const SECTION: u32 = 0x0A0D_0D0A;
 const INTERFACE: u32 = 1;
+const OLD_PACKET: u32 = 2;
+const SIMPLE_PACKET: u32 = 3;
 const STATISTICS: u32 = 5;
 const PACKET: u32 = 6;
 const BYTE_ORDER: u32 = 0x1A2B_3C4D;
@@ -236,6 +238,8 @@ impl Parser {
         Ok(match self.u32(kind) {
             INTERFACE => self.interface(body, buses).map(|()| Some(Found::Nothing)),
             PACKET => self.packet(body, octets).map(Some),
+            // Packets without a time, or of an older draft: traffic, which nobody writes any more.
+            SIMPLE_PACKET | OLD_PACKET => Ok(Some(Found::Skipped)),
             _ => Ok(Some(Found::Nothing)),
         })
     }

@@ -91,9 +91,18 @@ struct Columns {
     data: usize,
 }
 
-/// Versions 1.1 and 1.2 have no type of frames but the word RTR in the place of data.
+/// Versions 1.x have no type of frames but the word RTR in the place of data.
 const VERSION_1_1: Columns =
     Columns { offset: 1, kind: None, bus: None, identifier: 3, direction: 2, length: 4, data: 5 };
+const VERSION_1_2: Columns = Columns {
+    offset: 1,
+    kind: None,
+    bus: Some(2),
+    identifier: 4,
+    direction: 3,
+    length: 5,
+    data: 6,
+};
 const VERSION_1_3: Columns = Columns {
     offset: 1,
     kind: None,
@@ -190,14 +199,19 @@ impl Parser {
         match key {
             b"FILEVERSION" => {
                 self.columns = match value {
-                    b"1.1" | b"1.2" => Some(VERSION_1_1),
+                    b"1.1" => Some(VERSION_1_1),
+                    b"1.2" => Some(VERSION_1_2),
                     b"1.3" => Some(VERSION_1_3),
                     // They say their columns themselves.
                     b"2.0" | b"2.1" => None,
                     _ => return Err(Damage::Version),
                 };
             }
-            b"STARTTIME" => self.begin = start_time(value).ok_or(Damage::Date)?,
+            b"STARTTIME" => {
+                // PCAN-Explorer 5 writes a semicolon behind it.
+                let days = value.strip_suffix(b";").unwrap_or(value);
+                self.begin = start_time(days).ok_or(Damage::Date)?;
+            }
             b"COLUMNS" => self.columns = Some(columns(value).ok_or(Damage::Head)?),
             _ => {}
         }

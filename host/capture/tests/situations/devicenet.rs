@@ -241,7 +241,7 @@ fn what_was_not_seen_is_not_guessed() {
             ),
             (
                 "42B#0A8E0010",
-                "5 → 10  explicit response Get_Attribute_Single Encoder Position Steps per turn (2f/1/7): 00 10",
+                "5 → 10  explicit response Get_Attribute_Single Encoder Position Steps per turn (2f/1/7): data 00 10",
             ),
             ("42C#", "→ 5  explicit request – empty"),
             ("42C#0A", "10 → 5  explicit request – a header and nothing else"),
@@ -264,13 +264,57 @@ fn a_node_of_another_vendor_has_no_position() {
     telling.frame("42C#0A0E2F010C");
     assert_eq!(
         telling.frame("42B#0A8E00100000"),
-        "5 → 10  explicit response Get_Attribute_Single Encoder Position Position value (2f/1/12): \
-         00 10 00 00"
+        "5 → 10  explicit response Get_Attribute_Single class (2f/1/12): data 00 10 00 00"
     );
     let mut strict = Telling::new(can0(), Output::Text, Assume::Nothing);
     assert_eq!(strict.frame("3C5#00100000"), "5  poll response: data 00 10 00 00");
     strict.frame("42F#00D401D2040000");
     assert_eq!(strict.frame("3C5#00100000"), "5  poll response: position 4096 step");
+}
+
+#[test]
+fn a_node_of_another_vendor_has_no_attributes_of_ours_but_those_of_the_standard() {
+    let mut telling = Telling::devicenet();
+    telling.frame("42F#000100D2040000");
+    told(
+        &mut telling,
+        &[
+            (
+                "42C#0A102F01070004",
+                "10 → 5  explicit request Set_Attribute_Single class (2f/1/7): data 00 04",
+            ),
+            (
+                "42B#0A9409FF",
+                "5 → 10  explicit response Set_Attribute_Single class (2f/1/7): error 09h, invalid \
+                 attribute value",
+            ),
+            ("42C#0A0E0F0101", "10 → 5  explicit request Get_Attribute_Single Parameter (0f/1/1)"),
+            (
+                "42B#0A8E01",
+                "5 → 10  explicit response Get_Attribute_Single Parameter (0f/1/1): data 01",
+            ),
+            (
+                "42C#0A0E0F0104",
+                "10 → 5  explicit request Get_Attribute_Single Parameter descriptor (0f/1/4)",
+            ),
+            (
+                "42B#0A8E0200",
+                "5 → 10  explicit response Get_Attribute_Single Parameter descriptor (0f/1/4): 0002h",
+            ),
+        ],
+    );
+}
+
+#[test]
+fn an_additional_code_has_its_meaning_only_with_its_request() {
+    told(
+        &mut Telling::devicenet(),
+        &[(
+            "42B#0A940902",
+            "5 → 10  explicit response: error 09h, invalid attribute value, additional code 02h – \
+             its request was not seen",
+        )],
+    );
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Files as other tools write them.
 
-use codewheel_capture::{Damage, Direction, Format, ReadError, Timestamp};
+use codewheel_capture::{Damage, Direction, Format, ReadError, Reader, Timestamp};
 use codewheel_station::can::{Frame, Identifier};
 
 use crate::bench::{Said, read, read_whole};
@@ -87,13 +87,14 @@ fn an_asc_in_decimal_with_times_from_line_to_line() {
 }
 
 #[test]
-fn trc_of_versions_1_1_1_3_and_2_0() {
+fn trc_of_versions_1_1_to_2_0() {
     let frame = Frame::standard(0x123, &[1, 2]);
     // 25569 days after the end of 1899 the time of computers begins.
     let head = |version| format!(";$FILEVERSION={version}\n;$STARTTIME=25569.5\n");
     let half_a_day = 43_200_000_000_000;
     let files = [
         format!("{}     1)      1.5  Rx         0123  2  01 02\n", head("1.1")),
+        format!("{}     1)     1.500 1  Rx        0123  2  01 02\n", head("1.2")),
         format!("{}     1)      1.500 1  Rx        0123 -  2    01 02\n", head("1.3")),
         format!(
             "{};$COLUMNS=N,O,T,I,d,l,D\n   1     1.500 DT    0123 Rx 2  01 02\n   2  2.0 ST   00 \
@@ -105,6 +106,61 @@ fn trc_of_versions_1_1_1_3_and_2_0() {
         let expected = [(half_a_day + 1_500_000, Direction::Received, frame)];
         assert_eq!(frames(Format::Trc, &text), expected, "{text}");
     }
+}
+
+/// PCAN-Explorer 5 writes a semicolon behind the time, warnings in the place of a direction, and the
+/// flag names of a warning behind its octets.
+#[test]
+fn a_trc_of_pcan_explorer_5_with_two_buses_and_a_warning() {
+    let text = ";$FILEVERSION=1.2\r\n;$STARTTIME=25569.5;\r\n\
+                \x20    1)      1.500 1 Rx           0123 2 01 02\r\n\
+                \x20    2)      1.834 1 Warng FFFFFFFF 4 00 00 00 04 BUSLIGHT\r\n\
+                \x20    3)      2.743 2 Tx           0100 3 RTR\r\n";
+    let half_a_day = 43_200_000_000_000;
+    let remote = Frame::remote(Identifier::Standard(0x100), 3).unwrap();
+    assert_eq!(
+        frames(Format::Trc, text),
+        [
+            (half_a_day + 1_500_000, Direction::Received, Frame::standard(0x123, &[1, 2])),
+            (half_a_day + 2_743_000, Direction::Sent, remote),
+        ]
+    );
+    let buses: Vec<u16> =
+        read_whole(Format::Trc, text.as_bytes()).iter().map(|kept| kept.bus).collect();
+    assert_eq!(buses, [0, 1]);
+}
+
+#[test]
+fn a_text_that_an_editor_of_windows_has_saved_with_its_mark_before_it() {
+    let log = "(1.0) can0 123#01\r\n";
+    let asc = "date Sun Nov 22 08:00:00.000 2026\r\nbase hex timestamps absolute\r\n\
+               0.5 1 123 Rx d 1 01\r\n";
+    let trc = ";$FILEVERSION=1.1\r\n;$STARTTIME=25569.5\r\n 1) 1.5 Rx 0123 1 01\r\n";
+    for (format, text) in [(Format::Log, log), (Format::Asc, asc), (Format::Trc, trc)] {
+        let marked = frames(format, &format!("\u{FEFF}{text}"));
+        assert_eq!(marked.len(), 1);
+        assert_eq!(marked, frames(format, text), "{format}");
+    }
+}
+
+#[test]
+fn an_asc_with_a_comment_in_latin_letters_of_one_octet() {
+    let text = b"base hex timestamps absolute\n// Gr\xF6\xDFe\n0.5 1 123 Rx d 1 01\n";
+    let records = read_whole(Format::Asc, text);
+    assert_eq!(records.len(), 1);
+    assert_eq!(records[0].content, Said::Frame(Frame::standard(0x123, &[1])));
+}
+
+/// A long file of version 1.0 would else be complained of line by line.
+#[test]
+fn a_trc_without_a_version_is_over_at_its_first_line() {
+    let text = "; a trace\n 1) 1841 0001 1 00\n 2) 1842 0001 1 00\n 3) 1843 0001 1 00\n";
+    let (records, errors, _) = read(Format::Trc, text.as_bytes());
+    assert!(records.is_empty());
+    let [ReadError::Damage { damage: Damage::Head, .. }] = errors.as_slice() else {
+        panic!("{errors:?}")
+    };
+    assert!(!errors[0].is_local());
 }
 
 #[test]
@@ -150,4 +206,36 @@ fn a_pcapng_in_the_other_octet_order_with_microseconds_and_foreign_interfaces() 
     assert_eq!(records.len(), 1);
     assert_eq!(records[0].at, Timestamp::from_nanos(2_000_000_000));
     assert_eq!(records[0].content, Said::Frame(Frame::standard(0x123, &[0xAB])));
+}
+
+#[test]
+fn packets_of_a_pcapng_that_have_no_time_are_counted_as_passed_over() {
+    let mut file = Vec::new();
+    let mut block = |kind: u32, body: &[u8]| {
+        let length = (body.len() as u32 + 12).to_le_bytes();
+        file.extend([&kind.to_le_bytes()[..], &length, body, &length].concat());
+    };
+    block(
+        0x0A0D_0D0A,
+        &[0x4D, 0x3C, 0x2B, 0x1A, 1, 0, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255],
+    );
+    block(1, &[227, 0, 0, 0, 0, 0, 0, 0]);
+    block(3, &[9, 0, 0, 0, 0, 0, 1, 0x23, 1, 0, 0, 0, 0xAB, 0, 0, 0]);
+    let mut reader = Reader::new(file.as_slice(), Format::Pcapng);
+    assert!(reader.read().unwrap().is_none());
+    assert_eq!(reader.skipped(), 1);
+}
+
+/// A name may have been typed by anybody: it must neither colour a terminal nor split a bus in two.
+#[test]
+fn a_bus_whose_name_is_no_text_is_one_bus_and_harmless_to_a_terminal() {
+    let text = b"(1.0) can\xFF\x1B[31m 123#01\n(2.0) can\xFF\x1B[31m 123#02\n";
+    let mut reader = Reader::new(text.as_slice(), Format::Log);
+    let mut places = Vec::new();
+    while let Some((_, record)) = reader.read().unwrap() {
+        places.push(record.bus);
+    }
+    assert_eq!(places, [0, 0]);
+    let names: Vec<&str> = reader.buses().iter().map(|bus| bus.name.as_str()).collect();
+    assert_eq!(names, ["can\u{FFFD}_[31m"]);
 }

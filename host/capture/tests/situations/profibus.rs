@@ -137,6 +137,23 @@ fn an_answer_counts_only_from_the_slave_that_was_asked() {
 }
 
 #[test]
+fn an_answer_that_names_its_service_is_not_taken_for_that_of_the_request() {
+    told(
+        &mut Telling::profibus(),
+        &[
+            ("68 05 05 68 87 82 5C 3B 3E DE 16", "2 → 7  SRD_low FCB 0 FCV 1 Get_Cfg"),
+            (
+                "68 0B 0B 68 82 87 08 3E 3C 02 05 00 FF 05 9B 31 16",
+                "7 → 2  DL Slave_Diag: [Station_Not_Ready], [Prm_Req], master none, ident number \
+                 059Bh",
+            ),
+            ("68 05 05 68 87 82 5C 33 3E D6 16", "2 → 7  SRD_low FCB 0 FCV 1 SAP: 51"),
+            ("E5", "7 → 2  acknowledge SAP: 51"),
+        ],
+    );
+}
+
+#[test]
 fn what_is_no_telegram_says_why() {
     told(
         &mut Telling::profibus(),

@@ -81,8 +81,9 @@ impl Explicit {
                     _ => (None, rest),
                 };
                 let asked = Asked { service, class, instance, attribute };
-                tell(&asked, line);
-                request_data(&asked, rest, nodes.is_encoder(slave), line);
+                let is_encoder = nodes.is_encoder(slave);
+                tell(&asked, is_encoder, line);
+                request_data(&asked, rest, is_encoder, line);
                 self.asked.insert(with, asked);
             }
             [] => line.note(&["a header and nothing else"]),
@@ -130,11 +131,11 @@ impl Explicit {
         };
         let asked = self.asked.remove(&with);
         if service == Service::ERROR.response() {
-            return refusal(asked.as_ref(), data, line);
+            return refusal(asked.as_ref(), data, nodes.is_encoder(slave), line);
         }
         match asked {
             Some(asked) if asked.service.response() == service => {
-                tell(&asked, line);
+                tell(&asked, nodes.is_encoder(slave), line);
                 response_data(slave, &asked, data, nodes, line);
             }
             _ => {
@@ -200,13 +201,14 @@ fn part<'a>(
 }
 
 /// Service and object.
-fn tell(asked: &Asked, line: &mut Line<'_>) {
+fn tell(asked: &Asked, is_encoder: bool, line: &mut Line<'_>) {
     let Asked { service, class, instance, attribute } = *asked;
     service_word(service, objects::service_name(service, Some(class)), line);
-    let object = objects::class_name(class);
+    let object = objects::class_name(class, is_encoder);
     match attribute {
         Some(attribute) => {
-            match objects::attribute(class, instance, attribute) {
+            let known = objects::attribute(class, instance, attribute);
+            match known.filter(|known| is_encoder || !known.is_ours()) {
                 Some(known) => line.attribute("object", &[object, " ", known.name()]),
                 None => line.attribute("object", &[object]),
             }
@@ -289,9 +291,9 @@ fn response_data(slave: MacId, asked: &Asked, data: &[u8], nodes: &mut Nodes, li
     }
 }
 
-fn refusal(asked: Option<&Asked>, data: &[u8], line: &mut Line<'_>) {
+fn refusal(asked: Option<&Asked>, data: &[u8], is_encoder: bool, line: &mut Line<'_>) {
     if let Some(asked) = asked {
-        tell(asked, line);
+        tell(asked, is_encoder, line);
     }
     let [general, additional, rest @ ..] = data else {
         line.octets("error", "error", data);
@@ -302,7 +304,7 @@ fn refusal(asked: Option<&Asked>, data: &[u8], line: &mut Line<'_>) {
     if *additional != 0xFF {
         line.hex("additional-code", "additional code", &[*additional]);
     }
-    let is_allocation = asked.is_none_or(|asked| {
+    let is_allocation = asked.is_some_and(|asked| {
         asked.class == class::DEVICENET
             && matches!(asked.service, Service::ALLOCATE | Service::RELEASE)
     });

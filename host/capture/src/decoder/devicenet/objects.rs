@@ -63,6 +63,11 @@ impl Attribute {
         self.name
     }
 
+    /// Whether its name is that of a row of ours, and means nothing on a device of another vendor.
+    pub(super) const fn is_ours(&self) -> bool {
+        matches!(self.form, Form::Row(_))
+    }
+
     /// Its name as a key of JSON; keys are made of it as of every name.
     pub(super) const fn key(&self) -> &'static str {
         match self.form {
@@ -238,7 +243,8 @@ pub(super) fn all(class: u8, instance: u8) -> impl Iterator<Item = Attribute> {
     numbers.filter_map(move |number| attribute(class, instance, number))
 }
 
-pub(super) const fn class_name(class: u8) -> &'static str {
+/// The name of a class. 2Fh is each vendor's own.
+pub(super) const fn class_name(class: u8, is_encoder: bool) -> &'static str {
     match class {
         class::IDENTITY => "Identity",
         class::MESSAGE_ROUTER => "Message Router",
@@ -247,7 +253,7 @@ pub(super) const fn class_name(class: u8) -> &'static str {
         class::CONNECTION => "Connection",
         PARAMETER => "Parameter",
         class::ACKNOWLEDGE_HANDLER => "Acknowledge Handler",
-        ENCODER_POSITION => "Encoder Position",
+        ENCODER_POSITION if is_encoder => "Encoder Position",
         _ => "class",
     }
 }

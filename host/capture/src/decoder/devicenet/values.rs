@@ -34,6 +34,9 @@ pub(super) fn told_attribute(
     // Two values of one attribute need their names.
     let is_one = known.is_some_and(|known| {
         !matches!(known.form, Form::Allocation | Form::Assembly | Form::Revision)
+            && (is_encoder || !known.is_ours())
+            // Octets of another length are no value: bare, `64` would look like one.
+            && (known.octets == 0 || known.octets == data.len())
     });
     if is_one && !data.is_empty() {
         line.name_is_told();
@@ -72,7 +75,7 @@ pub(super) fn attribute(
             line.number("minor-revision", "minor revision", data.last().map_or(0, number), "");
         }
         Form::ShortString => short_string(key, name, data, line),
-        Form::Path => path(key, name, data, line),
+        Form::Path => path(key, name, data, is_encoder, line),
         Form::Names(names) => named(names, key, name, data, line),
         Form::Bits(names) => line.bits(key, name, unsigned(data).cast_unsigned(), names),
         Form::Allocation => {
@@ -128,14 +131,14 @@ pub(super) fn short_string(key: &str, name: &str, data: &[u8], line: &mut Line<'
 }
 
 /// A path of 8-bit segments: `20` class, `24` instance, `30` attribute.
-fn path(key: &str, name: &str, data: &[u8], line: &mut Line<'_>) {
+fn path(key: &str, name: &str, data: &[u8], is_encoder: bool, line: &mut Line<'_>) {
     let (class, instance, attribute) = match *data {
         [0x20, class, 0x24, instance] => (class, instance, None),
         [0x20, class, 0x24, instance, 0x30, attribute] => (class, instance, Some(attribute)),
         _ => return line.octets(key, name, data),
     };
     line.octets(key, name, data);
-    line.word("path-class", "", objects::class_name(class).as_bytes());
+    line.word("path-class", "", objects::class_name(class, is_encoder).as_bytes());
     line.number("path-instance", "instance", instance.into(), "");
     if let Some(attribute) = attribute {
         line.number("path-attribute", "attribute", attribute.into(), "");
