@@ -52,6 +52,7 @@ impl Arguments {
 pub(crate) enum Verb {
     Run(RunArguments),
     Encoder(Box<EncoderArguments>),
+    Replay(ReplayArguments),
     Models(ModelsArguments),
     Describe(DescribeArguments),
     /// Write the EDS file of a DeviceNet model, for the configuration tool of its scanner.
@@ -75,6 +76,7 @@ pub(crate) enum Verb {
 Examples:
   codewheel run examples/demo.toml
   codewheel run examples/faults.toml --for 16s
+  codewheel run examples/demo.toml --for 10s --record demo.pcapng
   codewheel run plant.toml --json | jq 'select(.lamp == \"red\")'
   codewheel run plant.toml --print-config > complete.toml")]
 pub(crate) struct RunArguments {
@@ -92,6 +94,11 @@ pub(crate) struct RunArguments {
     /// One JSON object a line, for each device and second
     #[arg(long, conflicts_with = "print_config")]
     pub(crate) json: bool,
+
+    /// Record what all buses carry into one file, which is made anew: .pcapng or .log; .asc or .trc
+    /// where all buses are DeviceNet
+    #[arg(long, value_name = "FILE", conflicts_with = "print_config")]
+    pub(crate) record: Option<PathBuf>,
 }
 
 /// Play one encoder on a bus until Ctrl-C.
@@ -106,6 +113,7 @@ Examples:
   codewheel encoder amg11-p29 --bus rs485-listen:pty:./pb --address 7 --baud 19200 \\
       --fault 'jump steps=4000 at=30s'
   codewheel encoder heag162-p29 --bus rs485:/dev/ttyUSB0 --address 7 --ssi-word 25
+  codewheel encoder amg11-d29 --bus socketcan:can0 --address 5 --record session.pcapng
 
 Shafts: still | turn rpm=60 | sine amplitude=90deg period=2s |
         profile 0s:0 1s:90deg 3s:2turns [repeat] | csv FILE (lines of seconds,turns).
@@ -164,6 +172,11 @@ pub(crate) struct EncoderArguments {
     #[arg(long = "fault", value_name = "FAULT")]
     pub(crate) faults: Vec<String>,
 
+    /// Record what the bus carries into a file, which is made anew: .pcapng or .log; .asc or .trc
+    /// for DeviceNet
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+
     #[command(flatten)]
     pub(crate) ssi: SsiArguments,
 }
@@ -196,6 +209,27 @@ pub(crate) struct SsiArguments {
     /// Read each word twice and compare
     #[arg(long)]
     pub(crate) ssi_double_read: bool,
+}
+
+/// Tell what a recording holds: each frame and telegram by its name, with its numbers.
+///
+/// Reads what --record writes, and the same formats of other tools: .log of candump -L, .asc of
+/// Vector, .trc of PEAK, .pcapng of Wireshark. What cannot be read is said on stderr, with its
+/// place, and passed over.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel replay session.pcapng
+  codewheel replay session.log --json | jq 'select(.bus == \"can0\")'
+
+Exit codes: 0 all was read, 1 something is damaged, 2 no such format, 3 the file cannot be read.")]
+pub(crate) struct ReplayArguments {
+    /// The recording; its suffix says its format
+    pub(crate) file: PathBuf,
+
+    /// One JSON object a line, for each frame and telegram
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// List the models.

@@ -7,8 +7,8 @@ use codewheel_device::product::Bus;
 use codewheel_device::{Switches, profibus};
 use codewheel_link::{BusUri, Clock, Medium};
 use codewheel_plant::{
-    BusPlan, DeviceNet, DeviceOptions, DevicePlan, Fault, FieldBus, PortBus, Profibus, Report,
-    SensorPlan,
+    BusPlan, DeviceNet, DeviceOptions, DevicePlan, Fault, FieldBus, PortBus, Profibus, Recording,
+    Report, SensorPlan,
 };
 use codewheel_sim::shaft::Shaft;
 use codewheel_station::can::BitRate;
@@ -16,6 +16,7 @@ use codewheel_station::rs485::BaudRate;
 
 use crate::arguments::{Chatter, EncoderArguments};
 use crate::failure::Failure;
+use crate::record;
 use crate::signals::stop_flag;
 use crate::tell;
 
@@ -37,7 +38,8 @@ fn devicenet(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failu
             .ok_or_else(|| no_rate(text, "125k, 250k and 500k"))?,
     };
     let device = device(arguments, Switches::set_to(address, rate))?;
-    play(arguments, BusPlan::<DeviceNet>::new("", arguments.bus.clone(), rate), device, chatter)
+    let plan = BusPlan::<DeviceNet>::new(name(&arguments.bus), arguments.bus.clone(), rate);
+    play(arguments, plan, device, chatter)
 }
 
 fn profibus(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failure> {
@@ -54,7 +56,16 @@ fn profibus(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failur
     // A serial port runs at some rate, which nobody need know.
     let auto_baud = arguments.baud.is_none() && matches!(arguments.bus, BusUri::Rs485Device(_));
     let device = DevicePlan { options: DeviceOptions { auto_baud }, ..device };
-    play(arguments, BusPlan::<Profibus>::new("", arguments.bus.clone(), rate), device, chatter)
+    let plan = BusPlan::<Profibus>::new("pb0", arguments.bus.clone(), rate);
+    play(arguments, plan, device, chatter)
+}
+
+/// What a recording calls a CAN bus: its interface where it has one, otherwise as most do.
+fn name(bus: &BusUri) -> &str {
+    match bus {
+        BusUri::SocketCan(interface) => interface,
+        _ => "can0",
+    }
 }
 
 /// Whether the bus carries what the model speaks.
@@ -123,7 +134,17 @@ fn play<B: FieldBus>(
 ) -> Result<(), Failure> {
     let is_virtual = plan.is_virtual();
     plan.devices.push(device);
+    let captured = vec![plan.captured()];
+    if let Some(path) = &arguments.record {
+        Recording::check(path, &captured)?;
+    }
     let mut bus = PortBus::power_up(plan, Clock::new())?;
+    // An older file is replaced when nothing else is in the way.
+    let recording =
+        arguments.record.as_deref().map(|path| Recording::create(path, captured)).transpose()?;
+    if let Some(recording) = &recording {
+        bus.record(recording, 0);
+    }
     let waker = bus.waker();
     let stop = stop_flag(move || waker.wake())?;
     let mut out = std::io::stdout().lock();
@@ -143,7 +164,9 @@ fn play<B: FieldBus>(
     }
     bus.finish();
     tell(&mut bus, chatter);
-    Ok(result?)
+    let recorded = recording.map_or(Ok(()), |recording| record::end(recording, chatter));
+    result?;
+    recorded
 }
 
 fn tell<B: FieldBus>(bus: &mut PortBus<B>, chatter: Chatter) {

@@ -4,8 +4,9 @@ use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use codewheel_capture::{ReadError, WriteError};
 use codewheel_link::LinkError;
-use codewheel_plant::{MemoryError, PlantError, StartError};
+use codewheel_plant::{MemoryError, PlantError, RecordError, StartError};
 use codewheel_sim::shaft::ShaftError;
 use thiserror::Error;
 
@@ -29,6 +30,15 @@ pub(crate) enum Failure {
         /// What the system said.
         reason: io::Error,
     },
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error("{}: {reason}", .path.display())]
+    Replay {
+        /// The recording.
+        path: PathBuf,
+        /// Why it cannot be read.
+        reason: ReadError,
+    },
     #[error("cannot write to stdout: {0}")]
     Output(#[from] io::Error),
     #[error("cannot catch Ctrl-C: {0}")]
@@ -50,12 +60,16 @@ impl Failure {
             | Self::Start(
                 StartError::Memory(MemoryError::AnotherProduct { .. })
                 | StartError::Master(_)
-                | StartError::Ssi(_),
-            ) => 2,
+                | StartError::Ssi(_)
+                | StartError::Record(RecordError { reason: WriteError::Format(_), .. }),
+            )
+            | Self::Record(RecordError { reason: WriteError::Format(_), .. }) => 2,
             Self::Plant(PlantError::Read { .. })
             | Self::Start(_)
             | Self::Link(_)
             | Self::File { .. }
+            | Self::Record(_)
+            | Self::Replay { .. }
             | Self::Output(_)
             | Self::Signals(_) => 3,
         })

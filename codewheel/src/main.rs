@@ -9,6 +9,8 @@ mod failure;
 mod files;
 mod hilo;
 mod models;
+mod record;
+mod replay;
 mod run;
 mod sheets;
 mod show;
@@ -28,6 +30,7 @@ fn main() -> ExitCode {
     let chatter = arguments.chatter();
     let result = match arguments.verb {
         Some(Verb::Doctor(doctor)) => return end(doctor::run(&doctor)),
+        Some(Verb::Replay(replay)) => return end(replay::run(&replay, chatter)),
         None => run::demo(chatter),
         Some(Verb::Run(arguments)) => run::run(&arguments, chatter),
         Some(Verb::Schema) => run::schema(),

@@ -10,6 +10,7 @@ use codewheel_plant::{BusSnapshot, Plant, Running};
 
 use crate::arguments::{Chatter, RunArguments};
 use crate::failure::Failure;
+use crate::record;
 use crate::show::{self, Show};
 use crate::signals::stop_flag;
 use crate::tell;
@@ -26,7 +27,8 @@ pub(crate) fn run(arguments: &RunArguments, chatter: Chatter) -> Result<(), Fail
         std::io::stdout().lock().write_all(plant.to_text().as_bytes())?;
         return Ok(());
     }
-    play(plant, arguments.lasts.map(|time| time.0.into()), arguments.json, chatter)
+    let lasts = arguments.lasts.map(|time| time.0.into());
+    play(plant, lasts, arguments.json, arguments.record.as_deref(), chatter)
 }
 
 pub(crate) fn demo(chatter: Chatter) -> Result<(), Failure> {
@@ -38,7 +40,7 @@ pub(crate) fn demo(chatter: Chatter) -> Result<(), Failure> {
              encoders and a master; Ctrl-C ends it, `codewheel --help` shows what else there is"
         );
     }
-    play(plant, None, false, chatter)
+    play(plant, None, false, None, chatter)
 }
 
 /// `codewheel schema`.
@@ -51,6 +53,7 @@ fn play(
     plant: Plant,
     lasts: Option<Duration>,
     json: bool,
+    record: Option<&Path>,
     chatter: Chatter,
 ) -> Result<(), Failure> {
     let stop = stop_flag(|| {})?;
@@ -64,7 +67,13 @@ fn play(
         })
         .collect();
     let names: Vec<_> = plant.buses.iter().map(|bus| bus.name().to_owned()).collect();
-    let running = plant.start(show.period())?;
+    let (running, recording) = match record {
+        None => (plant.start(show.period())?, None),
+        Some(path) => {
+            let (running, recording) = plant.start_recorded(show.period(), path)?;
+            (running, Some(recording))
+        }
+    };
     if chatter > Chatter::Quiet {
         for ((name, uri), crew) in names.iter().zip(running.uris()).zip(crews) {
             eprintln!("codewheel: {name} on {uri}: {crew}");
@@ -76,8 +85,10 @@ fn play(
     let (rest, ended) = running.stop();
     drop(show);
     rest.iter().for_each(|(_, snapshot)| tell::snapshot(snapshot, chatter));
+    let recorded = recording.map_or(Ok(()), |recording| record::end(recording, chatter));
     ended?;
-    Ok(shown?)
+    shown?;
+    recorded
 }
 
 fn count(number: usize, of: &str) -> String {

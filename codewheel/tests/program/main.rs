@@ -8,7 +8,10 @@ mod encoder;
 #[cfg(unix)]
 mod profibus;
 mod prompt;
+#[cfg(unix)]
+mod record;
 mod refusals;
+mod replay;
 mod run;
 #[cfg(unix)]
 mod terminal;

@@ -182,7 +182,7 @@ fn help_and_version_are_no_errors() {
 
 #[test]
 fn the_help_of_every_verb_with_choices_has_examples() {
-    for verb in ["run", "encoder", "describe", "eds", "gsd", "hilo", "doctor"] {
+    for verb in ["run", "encoder", "describe", "eds", "gsd", "hilo", "doctor", "replay"] {
         let help = printed(&[verb, "--help"]);
         let example = format!("\n  codewheel {verb} ");
         assert!(help.contains("Examples:") && help.contains(&example), "{help}");

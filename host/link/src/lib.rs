@@ -45,6 +45,7 @@ mod socket;
 #[cfg(target_os = "linux")]
 mod socketcan;
 pub mod socketcand;
+mod tap;
 mod turn;
 mod uri;
 mod virtual_bus;
@@ -54,5 +55,6 @@ pub use interface::InterfaceTrouble;
 pub use notice::{ControllerState, Notice};
 pub use port::{CanPort, Received, Waker, open};
 pub use rs485::{Rs485Loop, Rs485Port, Rs485Received, open_rs485};
+pub use tap::{Rs485Tap, Tap};
 pub use turn::{Clock, Loop, Outcome, STAND_IN};
 pub use uri::{BusUri, Endpoint, InvalidBusUri, Medium};

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use codewheel_station::{Duration, Instant, Station, can, can::Frame, earlier};
 
-use crate::{CanPort, LinkError, Notice, Received};
+use crate::{CanPort, LinkError, Notice, Received, Tap};
 
 /// How long after its hand-over a frame counts as sent on a port that does not report it: 100 ms,
 /// so that nothing that waits for its own frame hangs.
@@ -72,6 +72,7 @@ pub struct Loop {
     left_over: Option<Frame>,
     /// Frames on their way, oldest first.
     handed_over: VecDeque<HandedOver>,
+    tap: Option<Box<dyn Tap>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -81,19 +82,26 @@ struct HandedOver {
     /// Reported as sent by time-out. Remembered, so that a report of the port that comes late is
     /// not a second one.
     stood_in: bool,
+    /// The tap has seen it, since at its hand-over the port was one that reports nothing.
+    tapped: bool,
 }
 
 impl Loop {
     /// A loop in the time of `clock`.
     #[must_use]
     pub const fn new(clock: Clock) -> Self {
-        Self { clock, left_over: None, handed_over: VecDeque::new() }
+        Self { clock, left_over: None, handed_over: VecDeque::new(), tap: None }
     }
 
     /// The clock that the station is driven by.
     #[must_use]
     pub const fn clock(&self) -> Clock {
         self.clock
+    }
+
+    /// Lets `tap` see each frame from now on; `None`: nobody.
+    pub fn set_tap(&mut self, tap: Option<Box<dyn Tap>>) {
+        self.tap = tap;
     }
 
     /// One turn: lets the station do what fell due, hands over what it gives while the port takes
@@ -179,8 +187,12 @@ impl Loop {
             {
                 station.handle(now, can::Input::Sent(&oldest.frame));
             }
+            let tapped = !port.confirms();
+            if tapped && let Some(tap) = &mut self.tap {
+                tap.sent(now, &frame);
+            }
             let due = now + STAND_IN;
-            self.handed_over.push_back(HandedOver { frame, due, stood_in: false });
+            self.handed_over.push_back(HandedOver { frame, due, stood_in: false, tapped });
         }
         Ok(())
     }
@@ -191,12 +203,22 @@ impl Loop {
     {
         let now = self.clock.now();
         match received {
-            Received::Frame(frame) => station.handle(now, can::Input::Frame(&frame)),
+            Received::Frame(frame) => {
+                station.handle(now, can::Input::Frame(&frame));
+                if let Some(tap) = &mut self.tap {
+                    tap.received(now, &frame);
+                }
+            }
             Received::Sent(frame) => {
                 let place = self.handed_over.iter().position(|entry| entry.frame == frame);
                 let entry = place.and_then(|place| self.handed_over.remove(place));
                 if !entry.is_some_and(|entry| entry.stood_in) {
                     station.handle(now, can::Input::Sent(&frame));
+                }
+                if !entry.is_some_and(|entry| entry.tapped)
+                    && let Some(tap) = &mut self.tap
+                {
+                    tap.sent(now, &frame);
                 }
             }
             Received::BusOff => {

@@ -5,9 +5,10 @@ mod common;
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;
+use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
-use codewheel_link::{CanPort, Clock, LinkError, Loop, Received, STAND_IN, Waker, open};
+use codewheel_link::{CanPort, Clock, LinkError, Loop, Received, STAND_IN, Tap, Waker, open};
 use codewheel_station::can::{self, BitRate, Frame};
 use codewheel_station::{Duration as Span, Instant as Time, Station};
 use common::{Echo, Running};
@@ -66,13 +67,15 @@ impl Station for Overdue {
     }
 }
 
-/// A port that reads from a list and never confirms.
+/// A port that reads from a list.
 #[derive(Debug, Default)]
 struct Script {
     input: VecDeque<Received>,
     sent: Vec<Frame>,
     /// How many frames it says it is ready for and does not take.
     refusals: u32,
+    /// Whether it says that it reports what was sent; the list does.
+    confirms: bool,
 }
 
 impl CanPort for Script {
@@ -102,7 +105,7 @@ impl CanPort for Script {
     }
 
     fn confirms(&self) -> bool {
-        false
+        self.confirms
     }
 
     fn local_address(&self) -> Option<SocketAddr> {
@@ -111,6 +114,20 @@ impl CanPort for Script {
 
     fn describe(&self) -> String {
         "script".to_owned()
+    }
+}
+
+/// A tap that passes on what it sees.
+#[derive(Debug)]
+struct Told(Sender<(&'static str, Frame)>);
+
+impl Tap for Told {
+    fn received(&mut self, _: Time, frame: &Frame) {
+        self.0.send(("received", *frame)).unwrap();
+    }
+
+    fn sent(&mut self, _: Time, frame: &Frame) {
+        self.0.send(("sent", *frame)).unwrap();
     }
 }
 
@@ -171,7 +188,7 @@ fn a_frame_counts_as_sent_after_the_stand_in_where_the_port_is_silent() {
     let mut drive = Loop::new(Clock::new());
     let (mut echo, mut port) = (Echo { owed: true, ..Echo::default() }, Script::default());
     let start = drive.clock().now();
-    let until = start + STAND_IN - Span::from_millis(1);
+    let until = start + STAND_IN - Span::from_millis(50);
     drive.turn(&mut echo, &mut port, Some(until)).unwrap();
     assert_eq!(port.sent.len(), 1);
     assert!(echo.sent.is_empty());
@@ -236,4 +253,50 @@ fn a_station_overdue_on_a_bus_that_takes_nothing_does_not_spin() {
         drive.turn(&mut station, port.as_mut(), None).unwrap();
     }
     assert!(station.calls <= 24, "{} calls", station.calls);
+}
+
+#[test]
+fn a_tap_sees_what_comes_and_what_is_handed_over_to_a_port_that_does_not_confirm_each_once() {
+    let (told, seen) = channel();
+    let mut drive = Loop::new(Clock::new());
+    drive.set_tap(Some(Box::new(Told(told))));
+    let (mut echo, mut port) = (Echo::default(), Script::default());
+    let poll = Frame::standard(0x42D, &[]);
+    let answer = Frame::standard(0x3C5, &[0, 1]);
+    port.input.push_back(Received::Frame(poll));
+    drive.turn(&mut echo, &mut port, None).unwrap();
+    // A report that comes all the same, and one that comes late.
+    for _ in 0..2 {
+        port.input.push_back(Received::Sent(answer));
+        drive.turn(&mut echo, &mut port, None).unwrap();
+        std::thread::sleep(STAND_IN.into());
+    }
+    let all: Vec<_> = seen.try_iter().collect();
+    assert_eq!(all[..2], [("received", poll), ("sent", answer)]);
+    // Nothing on its way looks like the second report, so it is another frame.
+    assert_eq!(all[2..], [("sent", answer)]);
+    drive.set_tap(None);
+    port.input.push_back(Received::Frame(poll));
+    drive.turn(&mut echo, &mut port, None).unwrap();
+    assert_eq!(seen.try_iter().count(), 0);
+}
+
+#[test]
+fn a_tap_sees_a_frame_as_sent_when_a_port_that_confirms_says_so_and_never_one_that_was_lost() {
+    let (told, seen) = channel();
+    let mut drive = Loop::new(Clock::new());
+    drive.set_tap(Some(Box::new(Told(told))));
+    let mut echo = Echo { owed: true, ..Echo::default() };
+    let mut port = Script { confirms: true, ..Script::default() };
+    drive.turn(&mut echo, &mut port, Some(Time::ZERO)).unwrap();
+    assert_eq!(port.sent.len(), 1);
+    assert_eq!(seen.try_iter().count(), 0, "not yet on the bus");
+    port.input.push_back(Received::Sent(port.sent[0]));
+    drive.turn(&mut echo, &mut port, None).unwrap();
+    assert_eq!(seen.try_iter().collect::<Vec<_>>(), [("sent", port.sent[0])]);
+    echo.owed = true;
+    drive.turn(&mut echo, &mut port, Some(Time::ZERO)).unwrap();
+    port.input.extend([Received::BusOff, Received::Recovered]);
+    drive.turn(&mut echo, &mut port, None).unwrap();
+    assert_eq!((port.sent.len(), seen.try_iter().count()), (2, 0));
 }

@@ -22,6 +22,7 @@
 
 use std::fmt;
 
+use codewheel_capture::{self as capture, BusRecorder};
 use codewheel_device::{Product, Snapshot, product};
 use codewheel_encoder::{Kept, Start};
 use codewheel_link::{BusUri, Clock, LinkError, Notice, Waker};
@@ -97,6 +98,12 @@ pub trait FieldBus: Copy + fmt::Debug + PartialEq + Send + Sized + 'static {
 
     /// A loop in the time of `clock`.
     fn drive(clock: Clock) -> Self::Loop;
+
+    /// The bus of a plan, as captures name it.
+    fn captured(plan: &BusPlan<Self>) -> capture::Bus;
+
+    /// Records what the loop moves over a port at `rate`, or no more.
+    fn record(drive: &mut Self::Loop, recorder: Option<BusRecorder>, rate: Self::Rate);
 }
 
 /// Where the switches of a device stand.
@@ -243,6 +250,8 @@ pub trait Line<B: FieldBus>: Sized + fmt::Debug + Send {
     fn set_corruption_at(&mut self, id: Self::Id, probability: Option<f64>);
     /// Moves time on.
     fn run_until(&mut self, until: Instant, observer: &mut impl FnMut(&Self::Event));
+    /// Records an event, where it is something that the wire carried.
+    fn record(event: &Self::Event, recorder: &BusRecorder);
     /// The virtual time.
     fn now(&self) -> Instant;
     /// What has been counted.

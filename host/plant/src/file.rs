@@ -50,11 +50,13 @@ pub(crate) struct BusTable {
     /// What is spoken on it.
     #[serde(default)]
     pub(crate) kind: BusKind,
-    /// Where it is: virtual:NAME is simulated. A DeviceNet: slcan-listen:HOST:PORT plays an adapter
-    /// that others connect to, slcan:HOST:PORT connects to an adapter. A PROFIBUS:
-    /// rs485-listen:HOST:PORT and rs485-listen:pty:PATH are a line that others connect to,
-    /// rs485:HOST:PORT connects to such a line, rs485:/dev/tty… is a serial port. Default virtual:
-    /// and the name.
+    /// Where it is: virtual:NAME is simulated. A DeviceNet: socketcan:can0 is a CAN interface of
+    /// Linux; slcan:/dev/tty… is an SLCAN adapter at a serial port, of 115200 bit/s unless @SPEED
+    /// follows, slcan:HOST:PORT one on TCP; slcan-listen:HOST:PORT and slcan-listen:pty:PATH play an
+    /// adapter that others connect to, socketcand-listen:HOST:PORT a socketcand server. A PROFIBUS:
+    /// rs485:/dev/tty… is a serial port; rs485-listen:HOST:PORT and rs485-listen:pty:PATH are a line
+    /// that others connect to, rs485:HOST:PORT connects to such a line. A PATH begins with / or a
+    /// dot. Default virtual: and the name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<String>")]
     pub(crate) uri: Option<Spanned<String>>,

@@ -3,7 +3,8 @@
 //! A [`Plant`] comes from a TOML file, [`Plant::load`], and [`Plant::start`] lets it run by the clock
 //! on the wall, each bus in a thread of its own. A single bus is a [`VirtualBus`] on a simulated wire
 //! in virtual time, or a [`PortBus`] on a real port; a [`MemoryFile`] is the non-volatile memory of a
-//! device on either. What goes wrong, and when, stands in the file: [`Fault`].
+//! device on either. What goes wrong, and when, stands in the file: [`Fault`]. What the buses carry
+//! can be recorded meanwhile: [`Plant::start_recorded`], [`PortBus::record`].
 
 mod check;
 mod complaint;
@@ -20,6 +21,7 @@ mod plant;
 mod port_bus;
 mod print;
 mod profibus;
+mod recording;
 mod repeats;
 mod report;
 mod running;
@@ -38,6 +40,7 @@ pub use memory::{Found, MemoryError, MemoryFile};
 pub use plant::{AnyBusPlan, BusPlan, DevicePlan, Plant};
 pub use port_bus::{PortBus, StartError};
 pub use profibus::{Cable, DeviceOptions, DpMasterPlan, DpSlavePlan, PresetPlan, Profibus};
+pub use recording::{RecordError, Recording};
 pub use report::{Report, What};
 pub use running::Running;
 pub use sensor::SensorPlan;

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use codewheel_capture as capture;
 use codewheel_device::{Product, product};
 use codewheel_link::BusUri;
 use codewheel_sim::shaft::Shaft;
@@ -121,6 +122,12 @@ impl AnyBusPlan {
     pub const fn masters(&self) -> usize {
         any_bus!(self, bus => bus.masters.len())
     }
+
+    /// How a capture names it.
+    #[must_use]
+    pub fn captured(&self) -> capture::Bus {
+        any_bus!(self, bus => bus.captured())
+    }
 }
 
 impl<B: FieldBus> BusPlan<B> {
@@ -143,6 +150,12 @@ impl<B: FieldBus> BusPlan<B> {
     #[must_use]
     pub const fn is_virtual(&self) -> bool {
         matches!(self.uri, BusUri::Virtual(_))
+    }
+
+    /// How a capture names it.
+    #[must_use]
+    pub fn captured(&self) -> capture::Bus {
+        B::captured(self)
     }
 }
 

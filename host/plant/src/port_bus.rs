@@ -1,5 +1,6 @@
 //! A bus on a real port: all its devices and masters share the port.
 
+use codewheel_capture::BusRecorder;
 use codewheel_commission::profibus::SettingsError;
 use codewheel_encoder::ssi::Refusal;
 use codewheel_link::{Clock, LinkError, Waker};
@@ -13,7 +14,7 @@ use crate::crew::Crew;
 use crate::field_bus::{FieldBus, Shared};
 use crate::manned::Manned;
 use crate::report::{Report, What};
-use crate::{BusPlan, BusSnapshot, DeviceNet, MemoryError};
+use crate::{BusPlan, BusSnapshot, DeviceNet, MemoryError, RecordError, Recording};
 
 /// Why a plant cannot be started.
 #[derive(Debug, Error)]
@@ -37,6 +38,9 @@ pub enum StartError {
     /// This system has no such SSI lines.
     #[error("{0} cannot be opened here: SPI controllers are files on Linux only")]
     SsiNotHere(SsiUri),
+    /// What the buses carry cannot be recorded.
+    #[error(transparent)]
+    Record(#[from] RecordError),
 }
 
 /// A bus on a real port, in the time of the clock it was given.
@@ -46,6 +50,7 @@ pub struct PortBus<B: FieldBus = DeviceNet> {
     port: B::Port,
     drive: B::Loop,
     clock: Clock,
+    rate: B::Rate,
     crew: Crew<B>,
     uri: String,
 }
@@ -62,12 +67,13 @@ impl<B: FieldBus> PortBus<B> {
     }
 
     pub(crate) fn begin(manned: Manned<B>, port: B::Port, clock: Clock) -> Self {
-        let mut stations = B::Stations::new(manned.plan.bit_rate);
+        let rate = manned.plan.bit_rate;
+        let mut stations = B::Stations::new(rate);
         let mut crew = Crew::power_up(manned.in_threads(&B::waker(&port)), &mut stations);
         // What has no power at the beginning says nothing.
         crew.pull_levers(Instant::ZERO, &mut stations);
         let uri = B::describe(&port);
-        Self { stations, port, drive: B::drive(clock), clock, crew, uri }
+        Self { stations, port, drive: B::drive(clock), clock, rate, crew, uri }
     }
 
     /// Where the bus is, with the port it really got.
@@ -80,6 +86,16 @@ impl<B: FieldBus> PortBus<B> {
     #[must_use]
     pub fn waker(&self) -> Waker {
         B::waker(&self.port)
+    }
+
+    /// Records what the port carries from now on, as the bus at `place` of the recording, until
+    /// [`finish`](Self::finish).
+    pub fn record(&mut self, recording: &Recording, place: usize) {
+        self.record_with(recording.bus(place, self.now()));
+    }
+
+    pub(crate) fn record_with(&mut self, recorder: BusRecorder) {
+        B::record(&mut self.drive, Some(recorder), self.rate);
     }
 
     /// One turn of the stations and the port: waits once, for input, a wake-up, a deadline, a fault
@@ -108,8 +124,9 @@ impl<B: FieldBus> PortBus<B> {
         self.crew.take_reports(&mut self.stations)
     }
 
-    /// Waits until the memories have taken everything.
+    /// Waits until the memories have taken everything, and records no more.
     pub fn finish(&mut self) {
+        B::record(&mut self.drive, None, self.rate);
         self.crew.finish_memories(self.now(), &mut self.stations);
     }
 

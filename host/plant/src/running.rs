@@ -1,18 +1,22 @@
 //! A plant that runs by the clock on the wall, each bus in a thread of its own.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time;
 
+use codewheel_capture::BusRecorder;
 use codewheel_link::{Clock, LinkError, Waker};
 use codewheel_station::Duration;
 
-use crate::field_bus::FieldBus;
+use crate::field_bus::{FieldBus, Line};
 use crate::manned::Manned;
 use crate::plant::AnyBusPlan;
 use crate::report::prepend;
-use crate::{BusPlan, BusSnapshot, DeviceNet, Plant, PortBus, Profibus, StartError, VirtualBus};
+use crate::{
+    BusPlan, BusSnapshot, DeviceNet, Plant, PortBus, Profibus, Recording, StartError, VirtualBus,
+};
 
 /// How often a virtual bus catches up with the clock on the wall.
 const PACE: time::Duration = time::Duration::from_millis(5);
@@ -48,10 +52,38 @@ impl Plant {
     /// # Errors
     /// [`StartError`]; nothing is left half started.
     pub fn start(self, period: time::Duration) -> Result<Running, StartError> {
+        Ok(Self::switch_on(self.join()?, period, None))
+    }
+
+    /// As [`start`](Self::start), and records what all buses carry into the file at `path`, whose
+    /// suffix says its format. An older file is replaced when nothing else is in the way.
+    ///
+    /// # Errors
+    /// [`StartError`]; nothing is left half started.
+    pub fn start_recorded(
+        self,
+        period: time::Duration,
+        path: &Path,
+    ) -> Result<(Running, Recording), StartError> {
+        let buses: Vec<_> = self.buses.iter().map(AnyBusPlan::captured).collect();
+        Recording::check(path, &buses)?;
+        let ready = self.join()?;
+        let recording = Recording::create(path, buses)?;
+        Ok((Self::switch_on(ready, period, Some(&recording)), recording))
+    }
+
+    /// Opens all memory files, then all ports.
+    fn join(self) -> Result<Vec<AnyReady>, StartError> {
         let manned: Vec<AnyManned> =
             self.buses.into_iter().map(AnyManned::open).collect::<Result<_, _>>()?;
-        let ready: Vec<AnyReady> =
-            manned.into_iter().map(AnyManned::join).collect::<Result<_, _>>()?;
+        Ok(manned.into_iter().map(AnyManned::join).collect::<Result<_, _>>()?)
+    }
+
+    fn switch_on(
+        ready: Vec<AnyReady>,
+        period: time::Duration,
+        recording: Option<&Recording>,
+    ) -> Running {
         let clock = Clock::new();
         let shared = Arc::new(Shared::default());
         shared.lock().snapshots.resize_with(ready.len(), || None);
@@ -59,13 +91,15 @@ impl Plant {
             Running { shared, uris: Vec::new(), wakers: Vec::new(), threads: Vec::new() };
         for (place, ready) in ready.into_iter().enumerate() {
             let shared = Arc::clone(&running.shared);
-            let post = Post { shared, place, clock, period: period.into() };
+            // The time of each bus, simulated or not, is that of the one clock.
+            let recorder = recording.map(|recording| recording.bus(place, clock.now()));
+            let post = Post { shared, place, clock, period: period.into(), recorder };
             match ready {
                 AnyReady::DeviceNet(ready) => running.run(ready, post),
                 AnyReady::Profibus(ready) => running.run(ready, post),
             }
         }
-        Ok(running)
+        running
     }
 }
 
@@ -117,6 +151,7 @@ struct Post {
     place: usize,
     clock: Clock,
     period: Duration,
+    recorder: Option<BusRecorder>,
 }
 
 impl Post {
@@ -128,7 +163,12 @@ impl Post {
         let mut next = self.clock.now();
         while !self.stopped() {
             let now = self.clock.now();
-            bus.run_until(now, &mut |_| {});
+            match &self.recorder {
+                None => bus.run_until(now, &mut |_| {}),
+                Some(recorder) => {
+                    bus.run_until(now, &mut |event| B::Line::record(event, recorder));
+                }
+            }
             if now >= next {
                 next = now + self.period;
                 self.leave(bus.snapshot());
@@ -140,6 +180,9 @@ impl Post {
     }
 
     fn run_port<B: FieldBus>(&self, mut bus: PortBus<B>) -> Result<(), LinkError> {
+        if let Some(recorder) = self.recorder.clone() {
+            bus.record_with(recorder);
+        }
         let mut next = self.clock.now();
         let mut result = Ok(());
         while !self.stopped() && result.is_ok() {

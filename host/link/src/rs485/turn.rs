@@ -4,7 +4,7 @@ use codewheel_station::rs485::{BaudRate, Input, Node};
 use codewheel_station::{Duration, Instant, earlier};
 
 use super::port::{Rs485Port, Rs485Received};
-use crate::{Clock, LinkError, Outcome};
+use crate::{Clock, LinkError, Outcome, Rs485Tap};
 
 /// How often a station is looked after that stays overdue: its deadline cannot be waited for.
 const OVERDUE_PAUSE: Duration = Duration::from_millis(10);
@@ -41,19 +41,25 @@ pub struct Rs485Loop {
     last_input: Option<Instant>,
     /// A deadline that stayed although everything was done that it can ask for.
     stuck: Option<Instant>,
+    tap: Option<Box<dyn Rs485Tap>>,
 }
 
 impl Rs485Loop {
     /// A loop in the time of `clock`.
     #[must_use]
     pub const fn new(clock: Clock) -> Self {
-        Self { clock, rate: None, last_input: None, stuck: None }
+        Self { clock, rate: None, last_input: None, stuck: None, tap: None }
     }
 
     /// The clock that the station is driven by.
     #[must_use]
     pub const fn clock(&self) -> Clock {
         self.clock
+    }
+
+    /// Lets `tap` see all octets from now on; `None`: nobody.
+    pub fn set_tap(&mut self, tap: Option<Box<dyn Rs485Tap>>) {
+        self.tap = tap;
     }
 
     /// One turn: lets the station do what fell due, waits once — for octets, a wake-up, the
@@ -99,8 +105,13 @@ impl Rs485Loop {
         }
         let now = self.advance(station, port)?;
         if is_quiet {
-            while let Some(transmission) = station.transmit(self.clock.now()) {
+            loop {
+                let now = self.clock.now();
+                let Some(transmission) = station.transmit(now) else { break };
                 port.send(&transmission)?;
+                if let Some(tap) = &mut self.tap {
+                    tap.sent(now, transmission.octets());
+                }
             }
             self.stuck = station.deadline().filter(|deadline| *deadline <= now);
         }
@@ -176,8 +187,18 @@ impl Rs485Loop {
     ) -> Result<(), LinkError> {
         let now = self.clock.now();
         match received {
-            Rs485Received::Octets(octets) => station.handle(now, Input::Octets(&octets)),
-            Rs485Received::BrokenCharacter => station.handle(now, Input::BrokenCharacter),
+            Rs485Received::Octets(octets) => {
+                station.handle(now, Input::Octets(&octets));
+                if let Some(tap) = &mut self.tap {
+                    tap.received(now, &octets);
+                }
+            }
+            Rs485Received::BrokenCharacter => {
+                station.handle(now, Input::BrokenCharacter);
+                if let Some(tap) = &mut self.tap {
+                    tap.broken_character(now);
+                }
+            }
             Rs485Received::Notice(notice) => {
                 outcome.notices.push(notice);
                 return Ok(());

@@ -2,9 +2,12 @@
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;
+use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
-use codewheel_link::{Clock, LinkError, Rs485Loop, Rs485Port, Rs485Received, Waker, open_rs485};
+use codewheel_link::{
+    Clock, LinkError, Rs485Loop, Rs485Port, Rs485Received, Rs485Tap, Waker, open_rs485,
+};
 use codewheel_station::rs485::{BaudRate, Input, Node, Transmission};
 use codewheel_station::{Duration as Span, Instant as Time, Station};
 
@@ -305,4 +308,45 @@ fn the_port_follows_the_rate_of_the_station_and_a_deadline_that_stays_does_not_s
     port.input.push_back(octets(&[0x10]));
     run(&mut drive, &mut station, &mut port, Span::from_millis(1));
     assert_eq!(port.rates.get(10), Some(&BaudRate::ALL[0]));
+}
+
+/// A tap that passes on what it sees.
+#[derive(Debug)]
+struct Told(Sender<(&'static str, Time, Vec<u8>)>);
+
+impl Rs485Tap for Told {
+    fn received(&mut self, at: Time, octets: &[u8]) {
+        self.0.send(("received", at, octets.to_vec())).unwrap();
+    }
+
+    fn broken_character(&mut self, at: Time) {
+        self.0.send(("broken", at, Vec::new())).unwrap();
+    }
+
+    fn sent(&mut self, at: Time, octets: &[u8]) {
+        self.0.send(("sent", at, octets.to_vec())).unwrap();
+    }
+}
+
+#[test]
+fn a_tap_sees_what_comes_and_what_is_sent_at_the_times_of_the_station() {
+    let (told, seen) = channel();
+    let mut drive = Rs485Loop::new(Clock::new());
+    drive.set_tap(Some(Box::new(Told(told))));
+    let mut slave = Slave::at(BaudRate::Kbit19_2, 60);
+    let (first, rest) = REQUEST.split_at(2);
+    let broken = Some(Rs485Received::BrokenCharacter);
+    let mut port = Script::new(drive.clock(), [broken, octets(first), octets(rest)]);
+    run(&mut drive, &mut slave, &mut port, Span::from_millis(20));
+    drive.set_tap(None);
+    port.input.push_back(octets(&REQUEST));
+    run(&mut drive, &mut slave, &mut port, Span::from_millis(20));
+    assert_eq!(port.sent.len(), 2);
+    let all: Vec<_> = seen.try_iter().collect();
+    let said: Vec<_> = all.iter().map(|(how, _, octets)| (*how, octets.as_slice())).collect();
+    let expected: [(&str, &[u8]); 4] =
+        [("broken", &[]), ("received", first), ("received", rest), ("sent", &ANSWER)];
+    assert_eq!(said, expected);
+    assert!(all.is_sorted_by_key(|(_, at, _)| at));
+    assert_eq!(all[3].1, slave.spoke[0].0);
 }

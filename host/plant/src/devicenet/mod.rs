@@ -4,10 +4,11 @@ mod composite;
 mod plan;
 mod scanner;
 
+use codewheel_capture::{self as capture, BusRecorder, Direction};
 use codewheel_device::{DeviceNetEncoder, Event, Factory, Snapshot, product};
 use codewheel_devicenet::scanner::Scanner;
 use codewheel_encoder::{Kept, Start};
-use codewheel_link::{BusUri, CanPort, Clock, LinkError, Loop, Notice, Waker};
+use codewheel_link::{BusUri, CanPort, Clock, LinkError, Loop, Notice, Tap, Waker};
 use codewheel_sim::can::{self, Faults, NodeId, Statistics, Wire};
 use codewheel_sim::{Drops, Troubled};
 use codewheel_station::can::{BitRate, Filter, Frame, Input};
@@ -16,6 +17,7 @@ use codewheel_station::{Duration, Instant};
 use self::composite::Composite;
 use crate::crew::{Medium, Member};
 use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
+use crate::recording::Frames;
 use crate::sensor::PlantSensor;
 use crate::{BusPlan, MemoryError, StartError};
 
@@ -62,6 +64,14 @@ impl FieldBus for DeviceNet {
 
     fn drive(clock: Clock) -> Loop {
         Loop::new(clock)
+    }
+
+    fn captured(plan: &BusPlan<Self>) -> capture::Bus {
+        capture::Bus::devicenet(&plan.name, plan.bit_rate)
+    }
+
+    fn record(drive: &mut Loop, recorder: Option<BusRecorder>, _: BitRate) {
+        drive.set_tap(recorder.map(|recorder| Box::new(Frames(recorder)) as Box<dyn Tap>));
     }
 }
 
@@ -174,6 +184,12 @@ impl Line<DeviceNet> for Wire<Member<DeviceNet>> {
 
     fn run_until(&mut self, until: Instant, observer: &mut impl FnMut(&can::Event)) {
         Self::run_until(self, until, observer);
+    }
+
+    fn record(event: &can::Event, recorder: &BusRecorder) {
+        if let can::Event::Frame { at, frame, .. } = event {
+            recorder.frame(*at, frame, Direction::Received);
+        }
     }
 
     fn now(&self) -> Instant {

@@ -4,10 +4,13 @@ mod composite;
 mod dp_master;
 mod plan;
 
+use codewheel_capture::{self as capture, BusRecorder, Condition, Direction};
 use codewheel_device::profibus::Factory;
 use codewheel_device::{Event, ProfibusEncoder, Snapshot, product};
 use codewheel_encoder::{Kept, Model, Start};
-use codewheel_link::{BusUri, Clock, LinkError, Notice, Rs485Loop, Rs485Port, Waker, open_rs485};
+use codewheel_link::{
+    BusUri, Clock, LinkError, Notice, Rs485Loop, Rs485Port, Rs485Tap, Waker, open_rs485,
+};
 use codewheel_profibus::{Baud, Timing};
 use codewheel_sim::rs485::{self, Attachment, Faults, Hearing, NodeId, Statistics, Wire};
 use codewheel_sim::{Drops, Troubled};
@@ -19,6 +22,7 @@ use self::dp_master::DpMaster;
 use crate::check::baud_rate;
 use crate::crew::{Medium, Member};
 use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
+use crate::recording::Telegrams;
 use crate::sensor::PlantSensor;
 use crate::{BusPlan, MemoryError, StartError};
 
@@ -80,6 +84,21 @@ impl FieldBus for Profibus {
 
     fn drive(clock: Clock) -> Rs485Loop {
         Rs485Loop::new(clock)
+    }
+
+    fn captured(plan: &BusPlan<Self>) -> capture::Bus {
+        let bus = capture::Bus::profibus(&plan.name, plan.bit_rate);
+        // Who searches the rate has not been told it, and neither has anybody else.
+        let searches = plan.masters.is_empty()
+            && plan.devices.iter().any(|device| device.options.auto_baud)
+            && matches!(plan.uri, BusUri::Rs485Device(_));
+        let bits_per_second = bus.bits_per_second.filter(|_| !searches);
+        capture::Bus { bits_per_second, ..bus }
+    }
+
+    fn record(drive: &mut Rs485Loop, recorder: Option<BusRecorder>, rate: BaudRate) {
+        let tap = |recorder| Box::new(Telegrams::new(recorder, rate)) as Box<dyn Rs485Tap>;
+        drive.set_tap(recorder.map(tap));
     }
 }
 
@@ -208,6 +227,13 @@ impl Line<Profibus> for Wire<Member<Profibus>> {
 
     fn run_until(&mut self, until: Instant, observer: &mut impl FnMut(&rs485::Event)) {
         Self::run_until(self, until, observer);
+    }
+
+    fn record(event: &rs485::Event, recorder: &BusRecorder) {
+        if let rs485::Event::Telegram { octets, end, intact, .. } = event {
+            let condition = if *intact { Condition::Intact } else { Condition::Broken };
+            recorder.telegram(*end, octets.octets(), condition, Direction::Received);
+        }
     }
 
     fn now(&self) -> Instant {

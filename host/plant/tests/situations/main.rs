@@ -8,6 +8,7 @@ mod one_line;
 mod one_port;
 mod power_cuts;
 mod profibus;
+mod recording;
 mod running;
 
 use std::path::{Path, PathBuf};
