@@ -90,6 +90,8 @@ mkdir -p "$root"/{proc,sys,dev,tmp,modules}
 put "$(command -v busybox)" bin/busybox
 for tool in "${tools[@]}"; do put "$(command -v "$tool")" "tools/$tool"; done
 put "$program" tools/codewheel
+# All of it lies in the memory of the machine, and debug information is most of it.
+strip --strip-debug "$root/tools/codewheel"
 for module in "${modules[@]}"; do put_module "$module"; done
 printf '%s\n' "${modules[@]}" >"$root/modules/order"
 install "$strangers/socketcan_guest.sh" "$root/init"
@@ -101,7 +103,7 @@ trap 'rm -rf "$root" "$root.gz"' EXIT
 said=$(mktemp)
 trap 'rm -rf "$root" "$root.gz" "$said"' EXIT
 verdict=0
-timeout "$LIMIT" qemu-system-x86_64 -accel tcg -m 256 -nodefaults -no-reboot -display none \
+timeout "$LIMIT" qemu-system-x86_64 -accel tcg -m 512 -nodefaults -no-reboot -display none \
     -serial "file:$said" -device isa-debug-exit,iobase=0xf4,iosize=1 \
     -object can-bus,id=copper -device kvaser_pci,canbus=copper -device kvaser_pci,canbus=copper \
     -kernel "$kernel/vmlinuz" -initrd "$root.gz" \
