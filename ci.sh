@@ -115,30 +115,25 @@ step_strangers() {
     "$python" strangers/tshark_judges.py --self-test
     "$python" strangers/data_sheets.py --self-test host/datasheet/tests/golden
     "$python" strangers/data_sheets.py host/datasheet/tests/golden
-    # Walks mostly wait for the encoder's clock, so they go side by side.
+    # Walks mostly wait for the encoder's clock, so they go side by side; but not beside those whose
+    # masters are other people's and give up when they are kept waiting.
     # Not local, since the trap outlives this function.
     pids=()
     trap '[ ${#pids[@]} = 0 ] || kill "${pids[@]}" 2>/dev/null' EXIT
+    local failed=()
     walk session devicenet_session.py
     walk modes devicenet_chapters.py --part turning taken rushing singleturn
     walk resting devicenet_chapters.py --part resting
     walk objects devicenet_chapters.py --part objects
-    walk profibus-session profibus_session.py
     walk profibus-telegrams profibus_chapters.py --part telegrams rates lamp segment
     walk profibus-services profibus_chapters.py --part services watchdog
     walk profibus-settings profibus_chapters.py --part parameters data
     walk profibus-diagnosis profibus_chapters.py --part diagnosis
+    end_walks
+    walk profibus-session profibus_session.py
     walk pyprofibus pyprofibus_session.py
     walk python-can-links python_can_links.py
-    local at failed=()
-    for at in "${!pids[@]}"; do
-        if wait "${pids[at]}"; then
-            cat "$logs/${walks[at]}.out"
-        else
-            failed+=("$logs/${walks[at]}.out")
-        fi
-    done
-    pids=()
+    end_walks
     # What failed comes last, where people look first.
     if [ ${#failed[@]} != 0 ]; then
         cat "${failed[@]}"
@@ -149,6 +144,19 @@ step_strangers() {
     cargo run --quiet --package codewheel-capture --locked --example make_samples -- \
         "$logs/captures"
     "$python" strangers/captures.py "$logs/captures"
+}
+
+# Waits for the walks of `step_strangers` that have been started, and shows those that are well.
+end_walks() {
+    local at
+    for at in "${!pids[@]}"; do
+        if wait "${pids[at]}"; then
+            cat "$logs/${walks[at]}.out"
+        else
+            failed+=("$logs/${walks[at]}.out")
+        fi
+    done
+    pids=() walks=()
 }
 
 # Installs what it needs by itself.

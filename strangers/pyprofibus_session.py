@@ -33,7 +33,7 @@ from pyprofibus.dp_master import DPM1, DpSlaveDesc
 from pyprofibus.phy_serial import CpPhySerial
 from pyprofibus.util import ProfibusError
 
-from profibus_book import Diagnosis, Parameters, Seen, Telegram
+from profibus_book import BookViolation, Diagnosis, Parameters, Seen, Telegram
 from profibus_walk import ADDRESS, Start, jumps
 from steps import (
     Ended,
@@ -174,7 +174,11 @@ class PyprofibusSession(Steps):
         found = []
         for seen in self.conversation()[begin:]:
             if not seen.is_ours and seen.octets[0] == 0x68:
-                telegram = Telegram.parse(seen.octets)
+                try:
+                    telegram = Telegram.parse(seen.octets)
+                except BookViolation:
+                    # A master that is late gives an answer up in its midst, and asks again.
+                    continue
                 if telegram.ssap == 0x3C:
                     found.append(Diagnosis.parse(telegram.data))
         return found
