@@ -23,18 +23,6 @@ pub(super) struct Promises {
     delay: Option<Duration>,
 }
 
-/// The longest time until a slave answers, max T_SDR, in bits: what our GSD files promise.
-pub(super) const fn longest_station_delay(rate: BaudRate) -> u32 {
-    match rate {
-        BaudRate::Kbit500 => 100,
-        BaudRate::Mbit1_5 => 150,
-        BaudRate::Mbit3 => 250,
-        BaudRate::Mbit6 => 450,
-        BaudRate::Mbit12 => 800,
-        _ => 60,
-    }
-}
-
 /// The bits of `rate` that go into `time`, rounded up.
 fn bits(time: Duration, rate: BaudRate) -> u128 {
     (time.as_nanos() * u128::from(rate.bits_per_second())).div_ceil(1_000_000_000)
@@ -47,7 +35,7 @@ impl Promises {
 
     /// Whether answers begin within max T_SDR.
     fn holds_delay(&self, rate: BaudRate) -> bool {
-        bits(self.answer, rate) <= longest_station_delay(rate).into()
+        bits(self.answer, rate) <= rate.longest_station_delay().into()
     }
 
     /// Whether a master with the shortest slot time hears the first character of an answer.
@@ -92,7 +80,7 @@ impl Promises {
             "rates": BaudRate::ALL.map(|rate| json!({
                 "rate": rate.bits_per_second(),
                 "answer_bits": bits(self.answer, rate) as u64,
-                "max_station_delay_bits": longest_station_delay(rate),
+                "max_station_delay_bits": rate.longest_station_delay(),
                 "max_station_delay_held": self.holds_delay(rate),
                 "shortest_slot_bits": shortest_slot(rate),
                 "shortest_slot_held": self.holds_slot(rate),
@@ -113,7 +101,7 @@ impl Promises {
                 "{:<8}{:<13}{:<5}{:<7}{:<5}{:<7}{slot}",
                 rate.to_string(),
                 format!("{} bits", bits(self.answer, rate)),
-                longest_station_delay(rate),
+                rate.longest_station_delay(),
                 held(self.holds_delay(rate)),
                 shortest_slot(rate),
                 held(self.holds_slot(rate)),
@@ -149,7 +137,7 @@ mod tests {
                     .then(|| bits.trim().parse::<u32>().ok())?
             });
             if let Some(promise) = promise {
-                assert_eq!(promise, longest_station_delay(rate), "{rate}");
+                assert_eq!(promise, rate.longest_station_delay(), "{rate}");
             } else {
                 assert!(rate >= BaudRate::Mbit1_5, "{rate} is written with its M");
             }
@@ -160,7 +148,7 @@ mod tests {
             ("MaxTsdr_6M", BaudRate::Mbit6),
             ("MaxTsdr_12M", BaudRate::Mbit12),
         ] {
-            let promise = format!("{keyword} = {}", longest_station_delay(rate));
+            let promise = format!("{keyword} = {}", rate.longest_station_delay());
             assert!(sheet.replace("  ", " ").contains(&promise), "{promise}");
         }
     }

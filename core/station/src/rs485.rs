@@ -65,6 +65,24 @@ impl BaudRate {
         }
     }
 
+    /// Max T_SDR: the longest time in bits that a slave may take until it answers (EN 50170-2, the
+    /// vendor's GSD file; 45.45k as its neighbours, a decision).
+    #[must_use]
+    pub const fn longest_station_delay(self) -> u32 {
+        match self {
+            Self::Kbit9_6
+            | Self::Kbit19_2
+            | Self::Kbit45_45
+            | Self::Kbit93_75
+            | Self::Kbit187_5 => 60,
+            Self::Kbit500 => 100,
+            Self::Mbit1_5 => 150,
+            Self::Mbit3 => 250,
+            Self::Mbit6 => 450,
+            Self::Mbit12 => 800,
+        }
+    }
+
     /// How long `count` bits last, rounded up to the nanosecond.
     #[inline]
     #[must_use]

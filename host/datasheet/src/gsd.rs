@@ -148,7 +148,7 @@ fn rates(out: &mut Lines) {
         entry(format_args!("{}_supp", keyword_part(rate)), "1", out);
     }
     for rate in BaudRate::ALL {
-        let bits = longest_station_delay(rate);
+        let bits = rate.longest_station_delay();
         entry(format_args!("MaxTsdr_{}", keyword_part(rate)), bits, out);
     }
 }
@@ -156,18 +156,6 @@ fn rates(out: &mut Lines) {
 /// A rate as keywords name it: thousands without a letter.
 fn keyword_part(rate: BaudRate) -> String {
     rate.to_string().trim_end_matches('k').to_owned()
-}
-
-/// The longest T_SDR in bits (EN 50170-2), with 45.45k like its neighbours.
-const fn longest_station_delay(rate: BaudRate) -> u16 {
-    match rate {
-        BaudRate::Kbit500 => 100,
-        BaudRate::Mbit1_5 => 150,
-        BaudRate::Mbit3 => 250,
-        BaudRate::Mbit6 => 450,
-        BaudRate::Mbit12 => 800,
-        _ => 60,
-    }
 }
 
 /// What Set_Prm carries from octet 8 on, for old tools and for new ones.

@@ -15,22 +15,6 @@ const ROUNDING: u64 = 1;
 /// What a station with a microsecond clock is granted.
 pub(super) const MICROSECOND_CLOCK: u64 = 2_000;
 
-/// The longest station delay, max T_SDR, in bits (the vendor's GSD; 45.45k as its neighbours).
-const fn longest_station_delay(rate: BaudRate) -> u32 {
-    match rate {
-        BaudRate::Kbit9_6
-        | BaudRate::Kbit19_2
-        | BaudRate::Kbit45_45
-        | BaudRate::Kbit93_75
-        | BaudRate::Kbit187_5 => 60,
-        BaudRate::Kbit500 => 100,
-        BaudRate::Mbit1_5 => 150,
-        BaudRate::Mbit3 => 250,
-        BaudRate::Mbit6 => 450,
-        BaudRate::Mbit12 => 800,
-    }
-}
-
 /// A station that begins to speak.
 pub(super) struct Speaker<'a> {
     pub(super) slot: usize,
@@ -166,7 +150,7 @@ impl Police {
                 "answers {bits} bits after the request: min T_SDR is {LEAST_STATION_DELAY}"
             ));
         }
-        let longest = longest_station_delay(speaker.rate);
+        let longest = speaker.rate.longest_station_delay();
         (delay > nanos(speaker.rate, longest) + slack).then(|| {
             format!(
                 "answers {bits} bits after the request: max T_SDR is {longest} at {}",
@@ -201,7 +185,7 @@ impl Police {
     /// no shorter than max T_SDR.
     fn unentitled(&self, speaker: &Speaker<'_>, from: u8, token: bool) -> Option<String> {
         let Master { address, handed_by } = self.master.as_ref()?;
-        let long = nanos(speaker.rate, TIME_OUT_SLOTS * longest_station_delay(speaker.rate));
+        let long = nanos(speaker.rate, TIME_OUT_SLOTS * speaker.rate.longest_station_delay());
         let silent = self.idle(speaker)? + ROUNDING + speaker.grant >= long;
         let entitled = *address == from || silent || token && *handed_by == Some(from);
         (!entitled).then(|| {
