@@ -4,6 +4,9 @@ mod parameter;
 
 use codewheel_device::Product;
 use codewheel_device::devicenet::Factory;
+use codewheel_device::devicenet::parameter::{
+    CLASS_DESCRIPTOR, NO_CONFIGURATION_ASSEMBLY, descriptor, link_path, type_code,
+};
 use codewheel_device::devicenet::rows::{Row, Source};
 use codewheel_devicenet::ProducedPath;
 use codewheel_station::Writer;
@@ -33,12 +36,6 @@ const MINOR_REVISION: u8 = 1;
 const POLL: u16 = 1 << 0;
 const CHANGE_OF_STATE: u16 = 1 << 2;
 const CYCLIC: u16 = 1 << 3;
-
-/// Class attribute 8 of the Parameter object: instances, full attributes, storage commanded and done
-/// in non-volatile memory.
-const CLASS_DESCRIPTOR: u16 = 0x000F;
-/// Class attribute 9: there is no configuration assembly.
-const NO_CONFIGURATION_ASSEMBLY: u16 = 0;
 
 /// An I/O assembly.
 struct Assembly {
@@ -177,14 +174,14 @@ fn param(parameter: &Parameter, out: &mut Lines) {
     if !row.note.is_empty() {
         out.paragraph("        $", row.note);
     }
-    let path = parameter.path();
+    let path = link_path(row);
     fields(
         &format!("Param{instance}"),
         &[
             ("0".into(), "reserved"),
             (format!("{}, {}", path.len(), path_text(&path)), "path: octets, path"),
-            (hex(parameter.descriptor()), "descriptor"),
-            (format!("0x{:02X}", parameter.type_code()), row.data_type.name()),
+            (hex(descriptor(row)), "descriptor"),
+            (format!("0x{:02X}", type_code(row.data_type)), row.data_type.name()),
             (row.data_type.octets().to_string(), "octets"),
             (quoted(row.short_name), "name"),
             (quoted(row.unit), "unit"),

@@ -15,9 +15,9 @@ pub static LINKS: [u8; 19] = [3, 4, 5, 6, 7, 8, 9, 10, 12, 80, 81, 82, 85, 83, 8
 
 /// Class attribute 8: instances, full attributes, storage commanded and done in non-volatile
 /// memory.
-const CLASS_DESCRIPTOR: u16 = 0x000F;
+pub const CLASS_DESCRIPTOR: u16 = 0x000F;
 /// Class attribute 9: there is no configuration assembly.
-const NO_CONFIGURATION_ASSEMBLY: u16 = 0;
+pub const NO_CONFIGURATION_ASSEMBLY: u16 = 0;
 /// Class attribute 10: English.
 const NATIVE_LANGUAGE: u8 = 0;
 
@@ -65,7 +65,7 @@ pub(super) fn attribute(
     view: View<'_>,
     out: &mut Writer<'_>,
 ) -> Result<(), Error> {
-    let path = [0x20, ENCODER_POSITION, 0x24, 1, 0x30, row.attribute];
+    let path = link_path(row);
     fits(match attribute {
         VALUE => row.encode(view, out),
         2 => out.u8(path.len() as u8),
@@ -113,7 +113,15 @@ pub(super) fn enum_string(row: &Row, data: &[u8], out: &mut Writer<'_>) -> Resul
     fits(short_string(name, out))
 }
 
-fn descriptor(row: &Row) -> u16 {
+/// Instance attribute 3: the path of the attribute that the parameter refers to.
+#[must_use]
+pub const fn link_path(row: &Row) -> [u8; 6] {
+    [0x20, ENCODER_POSITION, 0x24, 1, 0x30, row.attribute]
+}
+
+/// Instance attribute 4: whether the value has names, cannot be set, changes by itself.
+#[must_use]
+pub fn descriptor(row: &Row) -> u16 {
     let enumerated = if row.values.is_empty() { 0 } else { ENUMERATED };
     let read_only = if row.write.is_none() { READ_ONLY } else { 0 };
     // What never changes needs no watching.
@@ -121,8 +129,9 @@ fn descriptor(row: &Row) -> u16 {
     enumerated | read_only | monitor
 }
 
-/// The data type codes of CIP volume 1, appendix C.
-const fn type_code(data_type: DataType) -> u8 {
+/// Instance attribute 5: the data type codes of CIP volume 1, appendix C.
+#[must_use]
+pub const fn type_code(data_type: DataType) -> u8 {
     match data_type {
         DataType::Bool => 0xC1,
         DataType::Dint => 0xC4,
@@ -132,8 +141,10 @@ const fn type_code(data_type: DataType) -> u8 {
     }
 }
 
-/// The values a parameter can have: its live limits, or what its names or its type allow.
-fn range(row: &Row, view: View<'_>) -> Range {
+/// Instance attributes 10 and 11, the values a parameter can have: its live limits, or what its names
+/// or its type allow.
+#[must_use]
+pub fn range(row: &Row, view: View<'_>) -> Range {
     if let Some(range) = row.range {
         return range(view);
     }
