@@ -1,4 +1,4 @@
-//! What the papers name is there: tests, files, and the places that links lead to.
+//! What the papers name is there: tests and files. Links are followed in `tests/book/links.rs`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -126,38 +126,6 @@ fn every_file_that_the_papers_name_is_there() {
         }
     }
     assert!(missing.is_empty(), "the papers name what is not there:\n{}", missing.join("\n"));
-}
-
-#[test]
-fn every_link_of_the_papers_leads_somewhere() {
-    let mut broken = Vec::new();
-    for name in PAPERS {
-        let text = paper(name);
-        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
-            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
-            if file.contains(':') {
-                continue;
-            }
-            let path = root().join(if file.is_empty() { name } else { file });
-            let good = match fs::read_to_string(&path) {
-                Ok(text) => heading.is_empty() || headings(&text).any(|found| found == heading),
-                Err(_) => path.exists() && heading.is_empty(),
-            };
-            if !good {
-                broken.push(format!("{name}: {link}"));
-            }
-        }
-    }
-    assert!(broken.is_empty(), "links that lead nowhere:\n{}", broken.join("\n"));
-}
-
-/// The headings of a paper as links name them.
-fn headings(text: &str) -> impl Iterator<Item = String> {
-    text.lines().filter(|line| line.starts_with('#')).map(|line| {
-        let kept = |letter: &char| letter.is_alphanumeric() || " -_".contains(*letter);
-        let words = line.trim_start_matches('#').trim();
-        words.to_lowercase().chars().filter(kept).collect::<String>().replace(' ', "-")
-    })
 }
 
 #[test]
