@@ -4,6 +4,10 @@
 //! [profirust](https://docs.rs/profirust), driven as a
 //! [`Station`](codewheel_station::Station) like every other endpoint of the house.
 //!
+//! A [`Session`] is one encoder, asked and told by the same words on both buses; a [`Survey`] is who
+//! is on a bus. Whatever cannot be done is a [`Trouble`]: what was tried, what came back, what to do.
+//! A [`Seat`] drives the station behind them, on a real port or on a wire in virtual time.
+//!
 //! # Panics
 //! Nothing a peer can send makes this crate panic. A panic is a bug.
 #![cfg_attr(
@@ -12,3 +16,12 @@
 )]
 
 pub mod profibus;
+mod seat;
+mod session;
+mod survey;
+mod trouble;
+
+pub use seat::{CanSeat, Rs485Seat, Seat};
+pub use session::{Identity, Name, Reading, Sample, Session, Value};
+pub use survey::{Found, Owner, Progress, Role, Survey};
+pub use trouble::{Kind, Trouble};
