@@ -10,6 +10,8 @@
 //! | [`MasterSettings`], [`SlaveSettings`] | what they are told, checked before profirust could panic |
 //! | [`Master::slave`] | inputs, diagnosis, where the slave stands |
 //! | [`Master::set_outputs`], [`Master::request_diagnosis`] | what the slave gets |
+//! | [`Master::serve`], [`Master::stop`] | slaves that come and go while it runs |
+//! | [`Master::ask`], [`Master::take_answer`] | what it asks of stations that it does not serve |
 //! | [`Master::take_event`] | what happened |
 //! | [`Master::cycle_times`], [`Master::counters`] | how the bus does |
 //!
@@ -34,6 +36,7 @@
 //! two seconds and three diagnoses after its Chk_Cfg is not ready is begun anew; what users set waits
 //! for the answer.
 
+mod acyclic;
 mod clock;
 mod event;
 mod judge;
@@ -44,6 +47,7 @@ mod slave;
 mod station;
 mod telegram;
 
+pub use acyclic::{Acyclic, Answer, Answered, StationKind};
 pub use event::{EVENTS, Event};
 pub use master::{Counters, Master, NotSet, UnknownSlave};
 pub use settings::{
