@@ -46,12 +46,14 @@ mod settings;
 mod slave;
 mod station;
 mod telegram;
+mod timeless;
 
 pub use acyclic::{Acyclic, Answer, Answered, StationKind};
 pub use event::{EVENTS, Event};
 pub use master::{Counters, Master, NotSet, UnknownSlave};
 pub use settings::{
     DATA_OCTETS, HIGHEST_ADDRESS, LONGEST_SLOT, MasterSettings, SettingsError, SlaveSettings,
-    USER_PARAMETER_OCTETS, shortest_slot,
+    USER_PARAMETER_OCTETS, patient_slot, shortest_slot,
 };
 pub use slave::{CycleTimes, Diagnosis, Service, SlaveState, SlaveView};
+pub use timeless::Timeless;
