@@ -23,11 +23,6 @@ const UNLOCK: u8 = 0x40;
 /// Set_Prm without user parameters.
 const PARAMETERS: usize = 7;
 
-/// So many are asked in a row by a master without slaves, so many between two cycles of one with
-/// slaves.
-const IN_A_ROW: u8 = 8;
-const BETWEEN_CYCLES: u8 = 1;
-
 /// What a master asks of a station that it need not serve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Acyclic {
@@ -156,6 +151,18 @@ impl Acyclic {
     }
 }
 
+impl StationKind {
+    /// By bits 5 and 4 of an answer (EN 50170-2, FDL).
+    pub(super) const fn of(code: codewheel_profibus::function_code::FunctionCode) -> Self {
+        match code.0 >> 4 & 3 {
+            0 => Self::Slave,
+            1 => Self::MasterNotReady,
+            2 => Self::MasterReady,
+            _ => Self::MasterInRing,
+        }
+    }
+}
+
 impl From<ResponseState> for StationKind {
     fn from(state: ResponseState) -> Self {
         match state {
@@ -168,13 +175,15 @@ impl From<ResponseState> for StationKind {
 }
 
 /// The requests that wait, the one under way, and what came of the others.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Requests {
     waiting: VecDeque<(u8, Acyclic)>,
     under_way: Option<UnderWay>,
     /// Whether the last telegram was such a request, so that the answer is for it.
     asking: bool,
+    /// Sent since the cycle began, and how many may be sent.
     in_a_row: u8,
+    most_in_a_row: u8,
     answered: VecDeque<Answered>,
 }
 
@@ -185,7 +194,24 @@ struct UnderWay {
     asked: u8,
 }
 
+impl Default for Requests {
+    fn default() -> Self {
+        Self {
+            waiting: VecDeque::new(),
+            under_way: None,
+            asking: false,
+            in_a_row: 0,
+            most_in_a_row: 1,
+            answered: VecDeque::new(),
+        }
+    }
+}
+
 impl Requests {
+    pub(super) const fn set_most_in_a_row(&mut self, most: u8) {
+        self.most_in_a_row = most;
+    }
+
     pub(super) fn push(&mut self, address: u8, request: Acyclic) {
         self.waiting.push_back((address, request));
     }
@@ -216,8 +242,8 @@ impl Requests {
     }
 
     /// The next one to be sent; `None` where none is, or it is the turn of the cycle.
-    fn next(&mut self, fdl: &FdlActiveStation, in_a_row: u8) -> Option<(u8, Acyclic)> {
-        if self.in_a_row >= in_a_row {
+    fn next(&mut self, fdl: &FdlActiveStation) -> Option<(u8, Acyclic)> {
+        if self.in_a_row >= self.most_in_a_row {
             return None;
         }
         if let Some(under_way) = self.under_way
@@ -260,8 +286,7 @@ impl FdlApplication for Applications<'_> {
         high_prio_only: bool,
     ) -> Option<TelegramTxResponse> {
         self.requests.asking = false;
-        let in_a_row = if self.dp.is_some() { BETWEEN_CYCLES } else { IN_A_ROW };
-        if let Some((address, request)) = self.requests.next(fdl, in_a_row) {
+        if !high_prio_only && let Some((address, request)) = self.requests.next(fdl) {
             return Some(request.send(address, fdl, tx));
         }
         let sent = match &mut self.dp {

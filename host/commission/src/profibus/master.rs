@@ -233,6 +233,13 @@ impl Master {
         Ok(())
     }
 
+    /// How many requests that it was told to [`ask`](Self::ask) it sends before the next cycle through
+    /// its slaves, or before it hands the token on; 1 unless it is told otherwise. Those to which nobody
+    /// answers last a slot time each, and other masters wait so long.
+    pub const fn ask_in_a_row(&mut self, most: u8) {
+        self.requests.set_most_in_a_row(most);
+    }
+
     /// What came of the oldest request that was [asked](Self::ask) and has not been fetched.
     pub fn take_answer(&mut self) -> Option<Answered> {
         self.requests.take()

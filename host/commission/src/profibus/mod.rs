@@ -38,10 +38,15 @@
 
 mod acyclic;
 mod clock;
+mod console;
+mod conversation;
 mod event;
+mod identity;
 mod judge;
 mod line;
 mod master;
+mod overheard;
+mod scan;
 mod settings;
 mod slave;
 mod station;
@@ -49,8 +54,11 @@ mod telegram;
 mod timeless;
 
 pub use acyclic::{Acyclic, Answer, Answered, StationKind};
+pub use console::Console;
 pub use event::{EVENTS, Event};
 pub use master::{Counters, Master, NotSet, UnknownSlave};
+pub use overheard::{HeardExchange, HeardMaster, HeardSetting, HeardSlave, Overheard};
+pub use scan::{ScanSettings, scan};
 pub use settings::{
     DATA_OCTETS, HIGHEST_ADDRESS, LONGEST_SLOT, MasterSettings, SettingsError, SlaveSettings,
     USER_PARAMETER_OCTETS, patient_slot, shortest_slot,
