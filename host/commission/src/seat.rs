@@ -26,6 +26,22 @@ pub trait Seat {
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError>;
 }
 
+impl<S: Seat + ?Sized> Seat for &mut S {
+    type Station = S::Station;
+
+    fn now(&self) -> Instant {
+        (**self).now()
+    }
+
+    fn station(&mut self) -> &mut S::Station {
+        (**self).station()
+    }
+
+    fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
+        (**self).turn(until)
+    }
+}
+
 /// A seat on a CAN port.
 #[derive(Debug)]
 pub struct CanSeat<S> {
