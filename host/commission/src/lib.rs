@@ -4,6 +4,8 @@
 //! [profirust](https://docs.rs/profirust), driven as a
 //! [`Station`](codewheel_station::Station) like every other endpoint of the house.
 //!
+//! [`devicenet`] commissions encoders on DeviceNet.
+//!
 //! A [`Session`] is one encoder, asked and told by the same words on both buses; a [`Survey`] is who
 //! is on a bus. Whatever cannot be done is a [`Trouble`]: what was tried, what came back, what to do.
 //! A [`Seat`] drives the station behind them, on a real port or on a wire in virtual time.
@@ -15,6 +17,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic)
 )]
 
+pub mod devicenet;
 pub mod profibus;
 mod seat;
 mod session;
