@@ -8,6 +8,7 @@
 //!
 //! A [`Session`] is one encoder, asked and told by the same words on both buses; a [`Survey`] is who
 //! is on a bus. Whatever cannot be done is a [`Trouble`]: what was tried, what came back, what to do.
+//! A [`Passport`](passport::Passport) is all that a replacement needs to give the same positions.
 //! A [`Seat`] drives the station behind them, on a real port or on a wire in virtual time.
 //!
 //! # Panics
@@ -18,6 +19,7 @@
 )]
 
 pub mod devicenet;
+pub mod passport;
 pub mod profibus;
 mod seat;
 mod session;
