@@ -54,7 +54,7 @@ pub fn listen<S: Seat<Station = Console>>(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Survey, Trouble> {
     let mut dialogue = Dialogue::new(seat);
-    dialogue.listen("listen to the bus", span, |percent| {
+    dialogue.listen_for("listen to the bus", span, |percent| {
         progress(Progress { doing: "listening".to_owned(), percent });
     })?;
     let now = dialogue.now();
