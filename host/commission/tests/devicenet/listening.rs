@@ -114,6 +114,23 @@ fn an_owner_that_falls_silent_is_forgotten_in_time() {
 }
 
 #[test]
+fn an_io_connection_that_has_ended_before_the_explicit_one_shows_in_the_lamp() {
+    let mut seat = WireSeat::new();
+    for text in ["42E#014B03010301", "42B#01CB00", "42D#", "3C5#00100000", "42D#", "3C5#00100000"] {
+        let now = seat.now();
+        seat.station().handle(now, Input::Frame(&frame(text)));
+        seat.run(millis(10));
+    }
+    let lamp = |seat: &mut WireSeat| {
+        let survey = listen(seat, millis(1), &mut unheard).unwrap();
+        survey.nodes.iter().find(|node| node.address == 5).expect("the slave").lamp
+    };
+    assert_eq!(lamp(&mut seat), Some("green"));
+    seat.run(secs(5));
+    assert_eq!(lamp(&mut seat), Some("red flashing"));
+}
+
+#[test]
 fn a_search_for_nodes_makes_nobody_a_slave() {
     // Another console asks the unconnected port of 5 for its vendor, and gets 02/03.
     let (console, now) = hearing(&["42E#3E0E010101", "42B#3E940203"]);

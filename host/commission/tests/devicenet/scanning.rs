@@ -1,7 +1,8 @@
 //! Finding out who is there.
 
-use codewheel_commission::devicenet::{ScanSettings, scan};
-use codewheel_commission::{Kind, Owner, Progress, Role};
+use codewheel_commission::devicenet::{Console, ScanSettings, scan};
+use codewheel_commission::{Kind, Owner, Progress, Role, Seat};
+use codewheel_devicenet::scanner::SlaveSettings;
 
 use crate::toy::Toy;
 use crate::wire_seat::{WireSeat, mac, secs, unheard};
@@ -117,4 +118,24 @@ fn a_scan_at_another_address_asks_all_the_others() {
     seat.run(secs(3));
     let trouble = scan(&mut seat, ScanSettings::default(), &mut unheard).unwrap_err();
     assert_eq!(trouble.kind, Kind::Bus);
+}
+
+#[test]
+fn a_forced_scan_finds_a_master_that_gives_no_address() {
+    let mut seat = WireSeat::new();
+    seat.encoder(5, "amg11-d29", "still");
+    let master = seat.master(1, SlaveSettings::poll(mac(5)));
+    seat.run(secs(6));
+    *seat.station() = Console::new();
+    let gentle = scan(&mut seat, ScanSettings::default(), &mut unheard).unwrap();
+    assert_eq!(gentle.nodes.iter().map(|node| node.address).collect::<Vec<_>>(), [5]);
+    let settings = ScanSettings { forced: true, ..ScanSettings::default() };
+    let forced = scan(&mut seat, settings, &mut unheard).unwrap();
+    let [found, slave] = forced.nodes.as_slice() else { panic!("{forced:#?}") };
+    assert_eq!((found.address, found.role), (1, Role::Unknown));
+    assert!(found.state.contains("perhaps a master"), "{}", found.state);
+    assert_eq!(slave.owner, Some(Owner::Somebody));
+    let trouble = seat.open(5).unwrap_err();
+    assert!(trouble.remedy.contains("which may be the node at 1"), "{}", trouble.remedy);
+    assert_eq!(seat.scanner(master).slave(mac(5)).unwrap().losses, 0);
 }
