@@ -24,6 +24,8 @@ const PATIENCE_BITS: u32 = 50_000;
 const WATCHDOG: Duration = Duration::from_secs(5);
 /// How many stations are asked with one token by a master alone.
 const IN_A_ROW: u8 = 8;
+/// A token on the line.
+const TOKEN_CHARACTERS: u32 = 3;
 /// How often progress is told while nothing happens.
 const STEP: Duration = Duration::from_millis(100);
 
@@ -203,11 +205,14 @@ impl<S: Seat<Station = Console>> Conversation<S> {
         Ok(answer.unwrap_or(Answer::Silence))
     }
 
-    /// Hands the token on and falls silent. Whoever is still in the way after a while is left so.
+    /// Hands the token on and falls silent, once the token is out.
     pub(super) fn leave(&mut self) -> Result<(), Trouble> {
         let until = self.patience();
         self.console().leave();
         self.wait(until, |console, _| console.master().is_none().then_some(()))?;
+        let out = self.rate().characters(TOKEN_CHARACTERS);
+        let until = self.seat.now() + out;
+        self.wait(until, |_, _| None::<()>)?;
         Ok(())
     }
 }
