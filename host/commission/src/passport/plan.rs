@@ -198,13 +198,7 @@ fn positioning(
         {
             return Ok(Positioning::Nothing);
         }
-        if before.position.at_rest == Some(false) {
-            return Err(fit::refused(
-                session,
-                "its shaft turns, and a preset is for a machine that stands".to_owned(),
-                "stop the machine and try again".to_owned(),
-            ));
-        }
+        must_stand(before, session)?;
         if goal.number("class-2") == Some(0) {
             return Err(fit::refused(
                 session,
@@ -229,6 +223,7 @@ fn positioning(
             if keeps(offset) {
                 return Ok(Positioning::Nothing);
             }
+            must_stand(before, session)?;
             fit::warn_of_turns(goal, before, warnings);
             return Ok(Positioning::Offset { offset });
         }
@@ -284,6 +279,17 @@ fn positioning(
         }
     }
     Ok(found)
+}
+
+fn must_stand(before: &Passport, session: &dyn Session) -> Result<(), Trouble> {
+    if before.position.at_rest != Some(false) {
+        return Ok(());
+    }
+    Err(fit::refused(
+        session,
+        "its shaft turns, and a preset is for a machine that stands".to_owned(),
+        "stop the machine and try again".to_owned(),
+    ))
 }
 
 impl Plan {
