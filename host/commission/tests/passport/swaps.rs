@@ -29,7 +29,8 @@ fn a_replacement_gives_the_positions_of_what_it_replaces() {
     let multiturn =
         [(8_192, 1 << 29), (3_600, 921_600), (3_600, 921_601), (360, 777), (8_192, 8_192), (7, 5)];
     let profibus_singleturn = [(8_192, 8_192), (3_600, 1_800), (3_600, 777), (1, 1)];
-    let families: [(&str, &[(i64, i64)], i64); 4] = [
+    type Scales<'a> = &'a [(i64, i64)];
+    let families: [(&str, Scales<'_>, i64); 4] = [
         ("amg11-d13", &singleturn, 1_111),
         ("amg11-d29", &multiturn, 77_777_777),
         ("amg81-p13", &profibus_singleturn, 1_111),

@@ -135,7 +135,7 @@ impl Toy {
     }
 
     fn measure(&mut self) {
-        self.now = self.now + CYCLE;
+        self.now += CYCLE;
         let sample = codewheel_encoder::Sample { code: self.code, ..Default::default() };
         self.encoder.sample(self.now, sample);
     }
