@@ -162,9 +162,15 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         }
     }
 
-    /// Asks a slave for its diagnosis that this master does not serve.
+    /// Asks a slave for its diagnosis that this master does not serve. On a PC that is busy an answer
+    /// may come after its slot, so silence is believed only after a while.
     fn ask_diagnosis(&mut self, tried: &str) -> Result<Diagnosis, Trouble> {
-        match self.conversation.ask(tried, self.address, Acyclic::Diagnosis)? {
+        let until = self.conversation.patience();
+        let mut answer = self.conversation.ask(tried, self.address, Acyclic::Diagnosis)?;
+        while answer == Answer::Silence && self.conversation.seat.now() < until {
+            answer = self.conversation.ask(tried, self.address, Acyclic::Diagnosis)?;
+        }
+        match answer {
             Answer::Diagnosis(diagnosis) => Ok(diagnosis),
             Answer::Silence => Err(self.silence(tried)),
             _ => Err(Trouble::new(
