@@ -36,11 +36,11 @@ impl Liar {
             (_, 1) => {
                 // A fragment of anything.
                 octets[0] |= 0x80;
-                octets.push((self.next() % 3) as u8 | (self.next() % 4 << 6) as u8);
+                octets.push((self.next() % 3) as u8 | ((self.next() % 4) << 6) as u8);
                 let length = self.next() % 6;
                 octets.extend((0..length).map(|_| self.random as u8));
             }
-            (_, 2) if self.next() % 4 == 0 => return,
+            (_, 2) if self.next().is_multiple_of(4) => return,
             _ => {
                 octets.push(service | 0x80);
                 for _ in 0..self.next() % 7 {
