@@ -63,6 +63,18 @@ fn a_node_at_our_own_address_keeps_it() {
 }
 
 #[test]
+fn of_two_nodes_at_one_address_the_first_is_opened_and_people_are_told() {
+    let mut seat = with_encoder();
+    seat.encoder(5, "amg11-d13", "still");
+    seat.run(secs(2));
+    let mut session = seat.open(5).unwrap();
+    assert_eq!(session.identify().unwrap().models[0].model, "amg11-d29");
+    let notices = session.take_notices();
+    assert!(notices[0].starts_with("two nodes have MAC ID 5"), "{notices:?}");
+    assert!(session.take_notices().is_empty());
+}
+
+#[test]
 fn a_node_that_comes_to_our_address_later_is_told_so_and_the_session_goes_on() {
     let mut seat = with_encoder();
     seat.after(secs(4), |seat| {

@@ -15,7 +15,7 @@ use super::dialogue::{Answer, Dialogue};
 use super::objects::ATTRIBUTES;
 use super::target::Target;
 use super::watch::{self, Watch};
-use super::{LISTEN_TIME, OWN_MAC, identity, troubles, values};
+use super::{LISTEN_TIME, OWN_MAC, identity, survey, troubles, values};
 use crate::{Identity, Kind, Name, Reading, Sample, Seat, Session, Trouble, Value};
 
 /// How long a Save may take: a device writes its memory for up to five seconds (AMG manual §8.3).
@@ -73,6 +73,9 @@ impl<S: Seat<Station = Console>> Encoder<S> {
             ));
         }
         dialogue.listen(&tried, settings.listen.max(LISTEN_TIME), |_| {})?;
+        if dialogue.console().overheard().node(address).contested_at.is_some() {
+            dialogue.notice(survey::contested(address));
+        }
         let now = dialogue.now();
         if let Some(owner) = dialogue.console().owner(now, address) {
             return Err(dialogue.owned(&tried, address, owner));
