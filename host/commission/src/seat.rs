@@ -26,19 +26,20 @@ pub trait Seat {
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError>;
 }
 
+/// A seat that is lent.
 impl<S: Seat + ?Sized> Seat for &mut S {
     type Station = S::Station;
 
     fn now(&self) -> Instant {
-        (**self).now()
+        S::now(self)
     }
 
-    fn station(&mut self) -> &mut S::Station {
-        (**self).station()
+    fn station(&mut self) -> &mut Self::Station {
+        S::station(self)
     }
 
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
-        (**self).turn(until)
+        S::turn(self, until)
     }
 }
 
