@@ -106,16 +106,17 @@ fn nobody_can_be_watched_whom_no_master_asks() {
 #[test]
 fn a_watch_ends_with_its_master() {
     let mut bench = Bench::new().with(7, "amg11-p29").with_plc(&[7]).after(SETTLED);
+    bench.unplug_after(Duration::from_millis(1_500), PLC);
     let mut ears = Eavesdropper::open(&mut bench, 7, &mut |_| {}).unwrap();
-    ears.sample().unwrap();
-    drop(ears);
-    bench.unplug_plc();
-    let trouble = Eavesdropper::open(&mut bench, 7, &mut |_| {}).map(|mut ears| {
-        // What was overheard before is the last there is.
-        ears.sample().unwrap();
-        ears.sample().unwrap_err()
-    });
-    assert_eq!(trouble.unwrap().kind, Kind::TimeOut);
+    let trouble = loop {
+        match ears.sample() {
+            Ok(sample) => assert!(sample.cycle.is_some()),
+            Err(trouble) => break trouble,
+        }
+    };
+    assert_eq!(trouble.kind, Kind::TimeOut);
+    let trouble = Eavesdropper::open(&mut bench, 7, &mut |_| {}).unwrap_err();
+    assert_eq!(trouble.came, "no master is on the bus", "what was heard before is over");
 }
 
 #[test]
