@@ -59,6 +59,11 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
         std::mem::take(&mut self.notices)
     }
 
+    /// Has people hear something.
+    pub(super) fn notice(&mut self, notice: String) {
+        self.notices.push(notice);
+    }
+
     /// Lets time pass until `done` gives something; `None` where it does not within `patience`.
     pub(super) fn wait<T>(
         &mut self,
@@ -308,7 +313,7 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
             Some(Err(NotTaken::UnknownSlave)) => Err(Trouble::new(
                 Kind::Usage,
                 tried,
-                format!("the device at MAC ID {mac} was released"),
+                format!("there is no connection to the device at MAC ID {mac} any more"),
                 "open it anew",
             )),
             Some(Err(_)) | None => Err(self.no_answer(tried, mac)),

@@ -288,18 +288,21 @@ fn state_of_free(status: Option<u16>) -> String {
     state
 }
 
+/// What to tell of an address that two nodes want.
+pub(super) fn contested(mac: MacId) -> String {
+    format!(
+        "two nodes have MAC ID {mac}: the one that came later is red and silent; give it another \
+         address and switch it on anew"
+    )
+}
+
 /// What people should know besides the nodes.
 fn remarks(console: &Console) -> Vec<String> {
     let overheard = console.overheard();
     let mut remarks: Vec<String> = overheard
         .nodes()
         .filter(|(_, heard)| heard.contested_at.is_some())
-        .map(|(mac, _)| {
-            format!(
-                "two nodes have MAC ID {mac}: the one that came later is red and silent; give it \
-                 another address and switch it on anew"
-            )
-        })
+        .map(|(mac, _)| contested(mac))
         .collect();
     let strays = overheard
         .nodes()

@@ -145,6 +145,18 @@ fn a_memory_that_fails_is_a_refusal_with_what_to_do() {
 }
 
 #[test]
+fn a_memory_that_takes_too_long_is_told_to_be_busy() {
+    let mut seat = with_encoder();
+    seat.memory_time = secs(20);
+    let mut session = seat.open(5).unwrap();
+    // After five seconds the device gives up waiting for its memory.
+    assert_eq!(session.save().unwrap_err().came, "it answers 19 store operation failed");
+    let busy = session.save().unwrap_err();
+    assert_eq!(busy.came, "it answers 10 device state conflict");
+    assert!(busy.remedy.contains("wait five seconds"), "{}", busy.remedy);
+}
+
+#[test]
 fn a_save_takes_the_time_that_a_memory_takes() {
     let mut seat = with_encoder();
     seat.memory_time = secs(4);

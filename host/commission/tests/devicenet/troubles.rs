@@ -1,6 +1,6 @@
 //! All that can go wrong, and what people are told.
 
-use codewheel_commission::devicenet::{ScanSettings, scan};
+use codewheel_commission::devicenet::{ScanSettings, listen, scan};
 use codewheel_commission::{Kind, Seat, Session, Trouble};
 use codewheel_devicenet::scanner::SlaveSettings;
 use codewheel_station::Station;
@@ -60,6 +60,18 @@ fn a_node_at_our_own_address_keeps_it() {
     let sent = seat.ours().len();
     is(&seat.open(5).unwrap_err(), Kind::Bus, "another node has the MAC ID 62");
     assert_eq!(seat.ours().len(), sent);
+}
+
+#[test]
+fn of_two_nodes_at_one_address_the_first_is_opened_and_people_are_told() {
+    let mut seat = with_encoder();
+    seat.encoder(5, "amg11-d13", "still");
+    seat.run(secs(2));
+    let mut session = seat.open(5).unwrap();
+    assert_eq!(session.identify().unwrap().models[0].model, "amg11-d29");
+    let notices = session.take_notices();
+    assert!(notices[0].starts_with("two nodes have MAC ID 5"), "{notices:?}");
+    assert!(session.take_notices().is_empty());
 }
 
 #[test]
@@ -139,6 +151,29 @@ fn an_adapter_that_is_gone_is_said_to_be_gone() {
     let now = seat.wire.now();
     seat.station().handle(now, Input::Attached);
     seat.open(5).unwrap();
+}
+
+#[test]
+fn a_plug_that_is_pulled_while_we_listen_is_told_at_once() {
+    let mut seat = with_encoder();
+    seat.after(millis(500), |seat| {
+        let now = seat.wire.now();
+        seat.station().handle(now, Input::Detached);
+    });
+    seat.after(millis(700), |seat| {
+        let now = seat.wire.now();
+        seat.station().handle(now, Input::Attached);
+    });
+    let begun = seat.wire.now();
+    let trouble = listen(&mut seat, secs(5), &mut unheard).unwrap_err();
+    is(&trouble, Kind::Bus, "the way to the bus is gone");
+    assert!(seat.wire.now().since(begun) < millis(600));
+    // What was heard before is not enough any more: it listens anew before it speaks.
+    seat.run(secs(1));
+    let back = seat.wire.now();
+    seat.open(5).unwrap();
+    let ours = seat.frames.iter().find(|(_, from, _)| *from == seat.console).expect("it spoke");
+    assert!(ours.0.since(back) >= millis(200), "{} after {back}", ours.0);
 }
 
 #[test]

@@ -14,10 +14,11 @@ use codewheel_sim::{Either, shaft::Shaft};
 use codewheel_station::can::{BitRate, Filter, Frame};
 use codewheel_station::{Duration, Instant};
 
+use crate::liar::Liar;
 use crate::toy::Toy;
 
 pub(crate) type Device = DeviceNetEncoder<Shaft>;
-pub(crate) type Node = Either<Console, Either<Device, Either<Scanner, Toy>>>;
+pub(crate) type Node = Either<Console, Either<Device, Either<Scanner, Either<Toy, Liar>>>>;
 
 pub(crate) const fn millis(millis: u64) -> Duration {
     Duration::from_millis(millis)
@@ -102,8 +103,13 @@ impl WireSeat {
 
     pub(crate) fn toy(&mut self, toy: Toy) -> NodeId {
         let filter = [toy.server.filter()];
-        let node = Either::Right(Either::Right(Either::Right(toy)));
+        let node = Either::Right(Either::Right(Either::Right(Either::Left(toy))));
         self.wire.attach("toy", node, &filter, false)
+    }
+
+    pub(crate) fn liar(&mut self, liar: Liar) {
+        let node = Either::Right(Either::Right(Either::Right(Either::Right(liar))));
+        self.wire.attach("liar", node, &[Filter::ALL], false);
     }
 
     pub(crate) fn device(&mut self, id: NodeId) -> &mut Device {
