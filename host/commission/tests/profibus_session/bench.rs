@@ -11,7 +11,7 @@ use codewheel_encoder::Start;
 use codewheel_link::{LinkError, Notice};
 use codewheel_profibus::{Baud, Timing};
 use codewheel_sim::Either;
-use codewheel_sim::rs485::{Attachment, Event, Hearing, NodeId, Wire};
+use codewheel_sim::rs485::{Attachment, Event, Faults, Hearing, NodeId, Wire};
 use codewheel_sim::shaft::Shaft;
 use codewheel_station::rs485::{BaudRate, Node};
 use codewheel_station::{Duration, Instant};
@@ -109,13 +109,14 @@ impl Bench {
         self.with_plc_at(rate, slaves)
     }
 
-    pub(crate) fn with_plc_at(mut self, rate: BaudRate, slaves: &[u8]) -> Self {
-        let settings = MasterSettings {
-            highest_station_address: 10,
-            gap_wait_rotations: 2,
-            watchdog: Some(Duration::from_millis(200)),
-            ..MasterSettings::new(PLC, rate)
-        };
+    pub(crate) fn with_plc_at(self, rate: BaudRate, slaves: &[u8]) -> Self {
+        let watchdog = Some(Duration::from_millis(200));
+        self.with_plc_of(MasterSettings { watchdog, ..MasterSettings::new(PLC, rate) }, slaves)
+    }
+
+    pub(crate) fn with_plc_of(mut self, settings: MasterSettings, slaves: &[u8]) -> Self {
+        let settings =
+            MasterSettings { highest_station_address: 10, gap_wait_rotations: 2, ..settings };
         let slave = |address: &u8| SlaveSettings {
             address: *address,
             ident_number: IDENT_NUMBER,
@@ -195,12 +196,20 @@ impl Bench {
         self.wire.node(*id).and_then(Either::right).and_then(Either::left).expect("an encoder")
     }
 
-    /// Unplugs an encoder in a while.
+    /// Destroys telegrams with this probability.
+    pub(crate) fn disturb(&mut self, corruption: f64) {
+        self.wire.set_faults(Faults { corruption, ..Faults::default() });
+    }
+
+    /// Unplugs an encoder, or the PLC, in a while.
     pub(crate) fn unplug_after(&mut self, time: Duration, address: u8) {
         self.unplugs = Some((self.wire.now() + time, address));
     }
 
     fn unplug(&mut self, address: u8) {
+        if address == PLC {
+            return self.unplug_plc();
+        }
         let place = self.devices.iter().position(|(of, _)| *of == address).expect("an encoder");
         let (_, id) = self.devices.remove(place);
         self.wire.detach(id);

@@ -1,9 +1,10 @@
 //! Before anybody speaks, and without ever speaking.
 
-use codewheel_commission::profibus::Eavesdropper;
+use codewheel_commission::profibus::{Console, Eavesdropper};
 use codewheel_commission::{Kind, Owner, Role, Seat};
-use codewheel_station::Duration;
-use codewheel_station::rs485::BaudRate;
+use codewheel_station::rs485::{BaudRate, Input};
+use codewheel_station::{Duration, Instant, Station};
+use proptest::prelude::*;
 
 use crate::bench::{Bench, PLC, RATE, alone, node, quick};
 
@@ -106,16 +107,17 @@ fn nobody_can_be_watched_whom_no_master_asks() {
 #[test]
 fn a_watch_ends_with_its_master() {
     let mut bench = Bench::new().with(7, "amg11-p29").with_plc(&[7]).after(SETTLED);
+    bench.unplug_after(Duration::from_millis(1_500), PLC);
     let mut ears = Eavesdropper::open(&mut bench, 7, &mut |_| {}).unwrap();
-    ears.sample().unwrap();
-    drop(ears);
-    bench.unplug_plc();
-    let trouble = Eavesdropper::open(&mut bench, 7, &mut |_| {}).map(|mut ears| {
-        // What was overheard before is the last there is.
-        ears.sample().unwrap();
-        ears.sample().unwrap_err()
-    });
-    assert_eq!(trouble.unwrap().kind, Kind::TimeOut);
+    let trouble = loop {
+        match ears.sample() {
+            Ok(sample) => assert!(sample.cycle.is_some()),
+            Err(trouble) => break trouble,
+        }
+    };
+    assert_eq!(trouble.kind, Kind::TimeOut);
+    let trouble = Eavesdropper::open(&mut bench, 7, &mut |_| {}).unwrap_err();
+    assert_eq!(trouble.came, "no master is on the bus", "what was heard before is over");
 }
 
 #[test]
@@ -140,4 +142,47 @@ fn on_a_silent_bus_it_is_said_what_to_look_at() {
         survey.remarks,
         ["nobody answers at 1.5M: look at supply, wiring, termination and rate"]
     );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(500) })]
+
+    /// Octets that look like telegrams more often than chance has it.
+    #[test]
+    fn whatever_comes_by_a_console_without_a_voice_says_nothing(
+        pieces in prop::collection::vec(
+            prop_oneof![
+                prop::collection::vec(any::<u8>(), 0..20),
+                (any::<[u8; 3]>(), prop::collection::vec(any::<u8>(), 0..70)).prop_map(telegram),
+                any::<[u8; 2]>().prop_map(|[to, from]| vec![0xDC, to, from]),
+                Just(vec![0xE5]),
+            ],
+            0..60,
+        ),
+    ) {
+        let mut console = Console::new(RATE);
+        let mut now = Instant::ZERO;
+        for piece in pieces {
+            now += RATE.bits(40) + RATE.characters(piece.len() as u32);
+            match piece.as_slice() {
+                [] => console.handle(now, Input::BrokenCharacter),
+                octets => console.handle(now, Input::Octets(octets)),
+            }
+            console.advance(now);
+            prop_assert_eq!(console.transmit(now), None);
+            prop_assert_eq!(console.deadline(), None);
+        }
+        let heard = console.overheard();
+        prop_assert!(heard.masters().all(|(address, _)| address <= 125));
+        prop_assert!(heard.slaves().all(|(address, _)| address <= 125));
+    }
+}
+
+/// A sound telegram, SD1 or SD2.
+fn telegram(([to, from, code], data): ([u8; 3], Vec<u8>)) -> Vec<u8> {
+    let body = [&[to, from, code][..], &data].concat();
+    let sum = body.iter().fold(0, |sum: u8, octet| sum.wrapping_add(*octet));
+    let length = body.len() as u8;
+    let head = if data.is_empty() { vec![0x10] } else { vec![0x68, length, length, 0x68] };
+    [head, body, vec![sum, 0x16]].concat()
 }
