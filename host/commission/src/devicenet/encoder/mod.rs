@@ -18,7 +18,7 @@ use super::watch::{self, Watch};
 use super::{LISTEN_TIME, OWN_MAC, identity, survey, troubles, values};
 use crate::{Identity, Kind, Name, Reading, Sample, Seat, Session, Trouble, Value};
 
-/// How long a Save may take: a device writes its memory for up to five seconds (AMG manual §8.3).
+/// How long a Save may take: our devices give their memory five seconds (decision).
 const SAVE_TIME: Duration = Duration::from_secs(6);
 /// How long Restore and Reset may take.
 const SERVICE_TIME: Duration = Duration::from_secs(2);
