@@ -403,6 +403,13 @@ impl Running {
         watcher
     }
 
+    /// Gives a reader a snapshot of each bus every `period` from now on, the first one soon. What has
+    /// happened meanwhile is told once, as ever.
+    pub fn watch_every(&self, watcher: &Watcher, period: time::Duration) {
+        watcher.set_period(period);
+        self.wake();
+    }
+
     /// Waits for snapshots that have not been fetched, at most for `patience`: of each bus the
     /// newest, if there is one, in the order of the plan. They come as often as the plant was told at
     /// its start.

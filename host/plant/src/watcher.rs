@@ -192,6 +192,16 @@ impl Watcher {
         trays.enumerate().filter_map(|(place, tray)| Some((place, tray.newest.take()?))).collect()
     }
 
+    /// Wants snapshots every `period` from now on, the first one at once.
+    pub(crate) fn set_period(&self, period: time::Duration) {
+        let mut notes = self.board.lock();
+        if let Some(desk) = notes.watchers.get_mut(&self.id) {
+            desk.period = period.into();
+            desk.trays.iter_mut().for_each(|tray| tray.next = Instant::ZERO);
+        }
+        self.board.set_period(&notes);
+    }
+
     /// Whether a bus was lost; then no snapshots of it come any more.
     #[must_use]
     pub fn has_ended(&self) -> bool {
