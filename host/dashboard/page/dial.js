@@ -33,7 +33,7 @@ export function angles(device, { steps }) {
 
 /** A small dial for the overview: needle, marks and where position 0 lies. */
 export function createSmallDial() {
-  const needle = svg("g", { class: "needle" }, svg("path", { d: "M-3 10 L0-36 L3 10Z" }));
+  const needle = svg("g", { class: "needle" }, svg("path", { d: "M-3.4 0 L-0.8-40 L0.8-40 L3.4 0 L2 15 L-2 15Z" }));
   const zero = svg("path", { class: "zero", d: "M-5-47 L5-47 L0-39Z" });
   const face = svg("circle", { class: "face", r: 46 });
   const marks = svg("path", { class: "marks", d: ticks(12, 41, 45) });
@@ -70,12 +70,12 @@ export function createLargeDial(shaft) {
   const zero = svg(
     "g", { class: "zero" },
     svg("path", { d: "M-6-118 L6-118 L0-107Z" }),
-    svg("text", { y: -120.5 }, "0"),
+    svg("text", { y: -124.5 }, "0"),
   );
   const arrow = svg("path", { class: "arrow", d: "M-21-12 A24 24 0 0 1 21-12 M21-12 l-8-1.6 M21-12 l1.6-8" });
   const root = svg(
     "svg",
-    { class: "dial large", viewBox: "-132 -132 264 264", "aria-hidden": "true" },
+    { class: "dial large", viewBox: "-131 -131 262 262", "aria-hidden": "true" },
     svg("circle", { class: "bezel", r: 106 }),
     svg("circle", { class: "face", r: 104 }),
     svg("path", { class: "marks fine", d: ticks(180, 101, 104) }),

@@ -77,11 +77,9 @@ function createField({ name, type, required, default: usual, help }, disabled) {
         const value = parseWhole(text);
         return value === null ? { wrong: `${name} is a whole number, not "${text}".` } : { value };
       }
-      if (type === "number") {
-        const value = Number(text);
-        return Number.isFinite(value) ? { value } : { wrong: `${name} is a number, not "${text}".` };
-      }
-      return { value: text };
+      if (type === "time") return { value: text };
+      const value = Number(text);
+      return Number.isFinite(value) ? { value } : { wrong: `${name} is a number, not "${text}".` };
     },
   };
 }

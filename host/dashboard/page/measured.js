@@ -50,7 +50,7 @@ export function createMeasured({ device, live }, history) {
       setText(code.value, whole(on?.code));
       const part = on?.total_resolution > 0 ? on.position / on.total_resolution : 0;
       range.firstChild.style.transform = `scaleX(${part.toFixed(4)})`;
-      setText(share, on ? percent(part, 1) : NOTHING);
+      setText(share, on ? percent(part, 2) : NOTHING);
       setText(total, whole(on?.total_resolution));
       const master = state?.master;
       setText(polled, whole(master?.position));

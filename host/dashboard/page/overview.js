@@ -9,6 +9,9 @@ import { createReports } from "./reports.js";
 import { linkTo } from "./routes.js";
 import { degrees, fixed, milliseconds, NOTHING, percent, whole } from "./units.js";
 
+/** More encoders than these get small cards. */
+const MANY = 24;
+
 /**
  * The overview of the plant. It stays in the document while an encoder is shown.
  * @param {object} plant what does not change
@@ -16,13 +19,14 @@ import { degrees, fixed, milliseconds, NOTHING, percent, whole } from "./units.j
  */
 export function createOverview(plant, live) {
   const cards = new Map();
+  const encoders = plant.buses.reduce((sum, bus) => sum + bus.devices.length, 0);
   const heads = plant.buses.map((bus) => createBus(bus, plant.read_only, cards));
   const counts = element("p", { class: "counts" });
   const find = createFilter((words, troubled) => show(cards, words, troubled));
   const reports = createReports(live, { title: "Events" });
   const heading = element("h1", { tabindex: -1 }, "Encoders");
   const root = element(
-    "div", { class: "overview" },
+    "div", { class: encoders > MANY ? "overview many" : "overview" },
     element("div", { class: "overview-head" }, heading, counts, find.root),
     ...heads.map((bus) => bus.root),
     reports.root,

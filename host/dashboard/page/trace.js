@@ -14,7 +14,7 @@ const PERIOD = 100;
  * @param {string[]} words in lower case
  */
 export function matches(line, words) {
-  const text = `${line.from} ${line.to} ${line.name} ${line.text} ${line.octets}`.toLowerCase();
+  const text = [line.from, line.to, line.name, line.text, line.octets].join(" ").toLowerCase();
   return words.every((word) => (word.startsWith("-") && word.length > 1
     ? !text.includes(word.slice(1))
     : text.includes(word)));
