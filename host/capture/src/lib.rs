@@ -40,7 +40,7 @@ mod recorder;
 mod writer;
 
 pub use bus::{Bus, Medium};
-pub use decoder::{Assume, Decoder, Output, Replayed, replay};
+pub use decoder::{Assume, Decoder, Output, Replayed, Said, replay};
 pub use format::{Format, FormatError};
 pub use framer::Framer;
 pub use reader::{Damage, Place, ReadError, Reader};

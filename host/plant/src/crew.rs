@@ -10,7 +10,11 @@ use crate::fault::{Action, Agenda, Lever};
 use crate::field_bus::{FieldBus, PlannedMaster, Switches, Talker, Told};
 use crate::manned::Manned;
 use crate::report::{Report, What};
-use crate::snapshot::{BusSnapshot, DeviceSnapshot, MasterSnapshot, SlaveSnapshot};
+use crate::snapshot::{
+    BusSnapshot, DeviceSnapshot, DeviceState, LampState, MasterSnapshot, ShaftState, SlaveSnapshot,
+    SwitchPositions,
+};
+use crate::{Cause, Command, Done, ObjectGroup, Refusal, Ticket};
 
 /// A station of a plant. A master is many times larger than an encoder, so both are boxed.
 #[derive(Debug)]
@@ -280,6 +284,19 @@ impl<B: FieldBus> Crew<B> {
                 product: hand.product,
                 device: snapshot,
                 master,
+                served_by: None,
+                state: DeviceState {
+                    power: snapshot.is_some(),
+                    shaft: ShaftState { code: None, motion: "".into(), turning: false },
+                    measured: None,
+                    lamp: LampState { colour: "off", pattern: "off", lit: false, text: "off" },
+                    connection: "absent",
+                    master: None,
+                    memory: None,
+                    switches: SwitchPositions::default(),
+                    switches_at_power_up: SwitchPositions::default(),
+                    faults: Vec::new(),
+                },
                 reports,
             });
         }
@@ -331,6 +348,37 @@ impl<B: FieldBus> Crew<B> {
             })
         };
         self.masters.iter_mut().enumerate().map(snapshot).collect()
+    }
+
+    /// Does something to the device that the plan calls `name`.
+    pub(crate) fn command(
+        &mut self,
+        _now: Instant,
+        _name: &str,
+        _command: &Command,
+        _medium: &mut impl Medium<B>,
+    ) -> Ticket {
+        Ticket(0)
+    }
+
+    /// What became of a command.
+    pub(crate) fn take_answer(
+        &mut self,
+        _now: Instant,
+        _ticket: Ticket,
+        _medium: &mut impl Medium<B>,
+    ) -> Option<Result<Done, Refusal>> {
+        Some(Err(Refusal::new(Cause::Impossible, "this plant cannot do that yet")))
+    }
+
+    /// What can be read of a device and set.
+    pub(crate) fn objects(
+        &mut self,
+        _now: Instant,
+        _name: &str,
+        _medium: &mut impl Medium<B>,
+    ) -> Result<Vec<ObjectGroup>, Refusal> {
+        Err(Refusal::new(Cause::Impossible, "this plant cannot tell its objects yet"))
     }
 
     /// Waits until all memories have taken everything.

@@ -1,7 +1,7 @@
 //! A device in a plant: switched on or off, with its memory, its faults and what it has told.
 
 use codewheel_device::{Event, Snapshot};
-use codewheel_encoder::Start;
+use codewheel_encoder::{Geometry, Start};
 use codewheel_link::Waker;
 use codewheel_sim::Drops;
 use codewheel_station::{Duration, Instant, Station, earlier};
@@ -13,7 +13,7 @@ use crate::keeper::Keeper;
 use crate::repeats::Repeats;
 use crate::report::{Report, Reports, What};
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, DevicePlan, MemoryError, StartError};
+use crate::{BusPlan, DeviceDescription, DevicePlan, MemoryError, StartError};
 
 /// A device with everything that outlives its power.
 #[derive(Debug)]
@@ -72,6 +72,29 @@ impl<B: FieldBus> Device<B> {
             drops: None,
             delay: Duration::ZERO,
         })
+    }
+
+    /// What does not change of it, as `plan` says it.
+    pub(crate) fn describe(&self, plan: &DevicePlan<B>) -> DeviceDescription {
+        let geometry = self.geometry();
+        DeviceDescription {
+            name: plan.name.clone(),
+            product: plan.product,
+            serial: self.outfit.serial,
+            singleturn_resolution: geometry.singleturn_resolution(),
+            revolutions: geometry.revolutions(),
+            bit_rates: B::bit_rates(),
+            rotary: B::ROTARY,
+            dip: B::DIP.to_vec(),
+            shaft_fixed: self.outfit.sensor.fixed(),
+            settings_fixed: None,
+            faults: Vec::new(),
+        }
+    }
+
+    /// What it measures with.
+    fn geometry(&self) -> Geometry {
+        self.outfit.sensor.geometry().unwrap_or(self.outfit.product.encoder.geometry)
     }
 
     /// Writes a memory file in a thread of its own from now on.

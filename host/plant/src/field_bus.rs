@@ -21,8 +21,9 @@
 //! [`Profibus`]: crate::Profibus
 
 use std::fmt;
+use std::sync::Arc;
 
-use codewheel_capture::{self as capture, BusRecorder};
+use codewheel_capture as capture;
 use codewheel_device::{Product, Snapshot, product};
 use codewheel_encoder::{Kept, Start};
 use codewheel_link::{BusUri, Clock, LinkError, Notice, Waker};
@@ -30,9 +31,10 @@ use codewheel_sim::Drops;
 use codewheel_station::{Duration, Instant, Station};
 
 use crate::crew::{Medium, Member};
+use crate::ears::Ears;
 use crate::sensor::{PlantSensor, SensorPlan};
 use crate::snapshot::{CycleTimes, SlaveState};
-use crate::{BusPlan, MemoryError, StartError};
+use crate::{BusPlan, DipSwitch, MemoryError, RotarySwitch, StartError};
 
 /// A station that speaks on the field bus `B`.
 pub trait Speaks<B: FieldBus>:
@@ -81,6 +83,15 @@ pub trait FieldBus: Copy + fmt::Debug + PartialEq + Send + Sized + 'static {
     /// The loop that turns a port.
     type Loop: fmt::Debug + Send;
 
+    /// The rotary switches of a bus cover.
+    const ROTARY: [RotarySwitch; 2];
+
+    /// The DIP switches of a bus cover, without the terminating resistor.
+    const DIP: &'static [DipSwitch];
+
+    /// The rates that a device of it can have, as people write them.
+    fn bit_rates() -> Vec<String>;
+
     /// The master of a plan, which has the place `place` among the masters of its bus.
     ///
     /// # Errors
@@ -102,8 +113,8 @@ pub trait FieldBus: Copy + fmt::Debug + PartialEq + Send + Sized + 'static {
     /// The bus of a plan, as captures name it.
     fn captured(plan: &BusPlan<Self>) -> capture::Bus;
 
-    /// Records what the loop moves over a port at `rate`, or no more.
-    fn record(drive: &mut Self::Loop, recorder: Option<BusRecorder>, rate: Self::Rate);
+    /// Hears what the loop moves over a port at `rate`, or no more.
+    fn listen(drive: &mut Self::Loop, ears: Option<Arc<Ears>>, rate: Self::Rate);
 }
 
 /// Where the switches of a device stand.
@@ -250,8 +261,8 @@ pub trait Line<B: FieldBus>: Sized + fmt::Debug + Send {
     fn set_corruption_at(&mut self, id: Self::Id, probability: Option<f64>);
     /// Moves time on.
     fn run_until(&mut self, until: Instant, observer: &mut impl FnMut(&Self::Event));
-    /// Records an event, where it is something that the wire carried.
-    fn record(event: &Self::Event, recorder: &BusRecorder);
+    /// Hears an event, where it is something that the wire carried.
+    fn record(event: &Self::Event, ears: &Ears);
     /// The virtual time.
     fn now(&self) -> Instant;
     /// What has been counted.

@@ -45,6 +45,14 @@ impl SensorPlan {
             Self::Ssi(settings) | Self::SsiLine(settings, _) => Some(settings.word.geometry()),
         }
     }
+
+    /// Why nobody can turn the shaft from here.
+    pub(crate) const fn fixed(&self) -> Option<&'static str> {
+        match self {
+            Self::Disc | Self::Ssi(_) => None,
+            Self::SsiLine(..) => Some("a real encoder is at the SSI line: turn its shaft"),
+        }
+    }
 }
 
 /// The sensor of a device, which the power of the device does not touch.

@@ -6,7 +6,9 @@ use crate::crew::{Crew, Medium, Member};
 use crate::field_bus::{FieldBus, Line, PlannedMaster, Switches};
 use crate::manned::{Manned, seed_at};
 use crate::report::What;
-use crate::{BusPlan, BusSnapshot, DeviceNet, StartError};
+use crate::{
+    BusPlan, BusSnapshot, Command, DeviceNet, Done, ObjectGroup, Refusal, StartError, Ticket,
+};
 
 /// A bus in virtual time, which begins at zero. Whoever owns it moves the time on.
 ///
@@ -93,6 +95,28 @@ impl<B: FieldBus> VirtualBus<B> {
         self.seen = statistics;
         let at = self.segment.wire.now();
         self.crew.snapshot(at, self.uri.clone(), Some(load), &mut self.segment)
+    }
+
+    /// Does something to the device that the plan calls `device`, now. What became of it,
+    /// [`take_answer`](Self::take_answer) says.
+    pub fn command(&mut self, device: &str, command: &Command) -> Ticket {
+        let now = self.segment.wire.now();
+        self.crew.command(now, device, command, &mut self.segment)
+    }
+
+    /// What became of a command; `None` as long as it is under way, or when it was asked for already.
+    pub fn take_answer(&mut self, ticket: Ticket) -> Option<Result<Done, Refusal>> {
+        let now = self.segment.wire.now();
+        self.crew.take_answer(now, ticket, &mut self.segment)
+    }
+
+    /// What can be read of a device and set, with the values of now.
+    ///
+    /// # Errors
+    /// [`Refusal`] where there is no such device.
+    pub fn objects(&mut self, device: &str) -> Result<Vec<ObjectGroup>, Refusal> {
+        let now = self.segment.wire.now();
+        self.crew.objects(now, device, &mut self.segment)
     }
 
     /// What has been counted on the wire.

@@ -1,6 +1,8 @@
 //! A line for people, or a JSON object, of the same words.
 
-use super::Output;
+use std::ops::Range;
+
+use super::{Output, Said};
 use crate::format::log::push_frame;
 use crate::hex::{push_decimal, push_octets};
 use crate::{Bus, Content, Direction, Record};
@@ -24,6 +26,10 @@ pub(super) struct Line<'o> {
     notes: bool,
     /// The name of the next value has been said already.
     told: bool,
+    /// Who speaks to whom.
+    ends: (Option<u8>, Option<u8>),
+    /// Where the kind of message stands.
+    message: Range<usize>,
 }
 
 /// Frames are padded to this width, so that what they say stands below each other.
@@ -79,11 +85,13 @@ impl<'o> Line<'o> {
                 out.push(b'"');
             }
         }
-        Self { out, output, values: false, notes: false, told: false }
+        let message = out.len()..out.len();
+        Self { out, output, values: false, notes: false, told: false, ends: (None, None), message }
     }
 
     /// Who speaks to whom, where that is known.
     pub(super) fn ends(&mut self, from: Option<u8>, to: Option<u8>) {
+        self.ends = (from, to);
         match self.output {
             Output::Text => {
                 if let Some(from) = from {
@@ -111,7 +119,11 @@ impl<'o> Line<'o> {
     /// What kind of message it is.
     pub(super) fn message(&mut self, message: &str) {
         match self.output {
-            Output::Text => self.text(message),
+            Output::Text => {
+                let begin = self.out.len();
+                self.text(message);
+                self.message = begin..self.out.len();
+            }
             Output::Json => {
                 self.text(",\"message\":\"");
                 self.text(message);
@@ -269,6 +281,15 @@ impl<'o> Line<'o> {
         }
         self.notes = true;
         parts.iter().for_each(|part| self.text(part));
+    }
+
+    /// Ends a line of text that is wanted in its parts.
+    pub(super) fn into_said(self) -> Said {
+        let part = |range| String::from_utf8_lossy(self.out.get(range).unwrap_or_default());
+        let (from, to) = self.ends;
+        let behind = part(self.message.end..self.out.len());
+        let text = behind.trim_start_matches(':').trim();
+        Said { from, to, message: part(self.message).into_owned(), text: text.to_owned() }
     }
 
     pub(super) fn end(mut self, content: &Content<'_>) {

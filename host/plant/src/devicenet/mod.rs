@@ -4,7 +4,9 @@ mod composite;
 mod plan;
 mod scanner;
 
-use codewheel_capture::{self as capture, BusRecorder, Direction};
+use std::sync::Arc;
+
+use codewheel_capture::{self as capture, Direction};
 use codewheel_device::{DeviceNetEncoder, Event, Factory, Snapshot, product};
 use codewheel_devicenet::scanner::Scanner;
 use codewheel_encoder::{Kept, Start};
@@ -16,10 +18,11 @@ use codewheel_station::{Duration, Instant};
 
 use self::composite::Composite;
 use crate::crew::{Medium, Member};
+use crate::ears::Ears;
 use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
 use crate::recording::Frames;
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, MemoryError, StartError};
+use crate::{BusPlan, DipSwitch, MemoryError, RotarySwitch, StartError};
 
 pub use plan::{Exchange, MasterPlan, SlavePlan};
 
@@ -46,6 +49,28 @@ impl FieldBus for DeviceNet {
     type Port = Box<dyn CanPort>;
     type Loop = Loop;
 
+    const ROTARY: [RotarySwitch; 2] = [
+        RotarySwitch { label: "1", meaning: "tens of the MAC ID", delivered: 0 },
+        RotarySwitch { label: "2", meaning: "units of the MAC ID", delivered: 0 },
+    ];
+    const DIP: &'static [DipSwitch] = &[
+        DipSwitch { label: "1", meaning: "not used", delivered: false },
+        DipSwitch {
+            label: "2",
+            meaning: "bit rate: 2 and 3 OFF OFF 125k, OFF ON 250k, ON OFF 500k",
+            delivered: false,
+        },
+        DipSwitch {
+            label: "3",
+            meaning: "bit rate: 2 and 3 OFF OFF 125k, OFF ON 250k, ON OFF 500k",
+            delivered: false,
+        },
+    ];
+
+    fn bit_rates() -> Vec<String> {
+        BitRate::ALL.iter().map(ToString::to_string).collect()
+    }
+
     fn make_master(plan: &MasterPlan, place: usize) -> Result<Scanner, StartError> {
         Ok(scanner::scanner(plan, place))
     }
@@ -70,8 +95,8 @@ impl FieldBus for DeviceNet {
         capture::Bus::devicenet(&plan.name, plan.bit_rate)
     }
 
-    fn record(drive: &mut Loop, recorder: Option<BusRecorder>, _: BitRate) {
-        drive.set_tap(recorder.map(|recorder| Box::new(Frames(recorder)) as Box<dyn Tap>));
+    fn listen(drive: &mut Loop, ears: Option<Arc<Ears>>, _: BitRate) {
+        drive.set_tap(ears.map(|ears| Box::new(Frames(ears)) as Box<dyn Tap>));
     }
 }
 
@@ -186,9 +211,9 @@ impl Line<DeviceNet> for Wire<Member<DeviceNet>> {
         Self::run_until(self, until, observer);
     }
 
-    fn record(event: &can::Event, recorder: &BusRecorder) {
+    fn record(event: &can::Event, ears: &Ears) {
         if let can::Event::Frame { at, frame, .. } = event {
-            recorder.frame(*at, frame, Direction::Received);
+            ears.frame(*at, frame, Direction::Received);
         }
     }
 

@@ -4,7 +4,9 @@ mod composite;
 mod dp_master;
 mod plan;
 
-use codewheel_capture::{self as capture, BusRecorder, Condition, Direction};
+use std::sync::Arc;
+
+use codewheel_capture::{self as capture, Condition, Direction};
 use codewheel_device::profibus::Factory;
 use codewheel_device::{Event, ProfibusEncoder, Snapshot, product};
 use codewheel_encoder::{Kept, Model, Start};
@@ -21,10 +23,11 @@ use self::composite::Composite;
 use self::dp_master::DpMaster;
 use crate::check::baud_rate;
 use crate::crew::{Medium, Member};
+use crate::ears::Ears;
 use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
 use crate::recording::Telegrams;
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, MemoryError, StartError};
+use crate::{BusPlan, DipSwitch, MemoryError, RotarySwitch, StartError};
 
 pub use plan::{DeviceOptions, DpMasterPlan, DpSlavePlan, PresetPlan};
 
@@ -66,6 +69,16 @@ impl FieldBus for Profibus {
     type Port = Box<dyn Rs485Port>;
     type Loop = Rs485Loop;
 
+    const ROTARY: [RotarySwitch; 2] = [
+        RotarySwitch { label: "1", meaning: "tens of the station address", delivered: 0 },
+        RotarySwitch { label: "2", meaning: "units of the station address", delivered: 0 },
+    ];
+    const DIP: &'static [DipSwitch] = &[];
+
+    fn bit_rates() -> Vec<String> {
+        BaudRate::ALL.iter().map(ToString::to_string).collect()
+    }
+
     fn make_master(plan: &DpMasterPlan, _: usize) -> Result<DpMaster, StartError> {
         Ok(DpMaster::new(plan)?)
     }
@@ -96,9 +109,9 @@ impl FieldBus for Profibus {
         capture::Bus { bits_per_second, ..bus }
     }
 
-    fn record(drive: &mut Rs485Loop, recorder: Option<BusRecorder>, rate: BaudRate) {
-        let tap = |recorder| Box::new(Telegrams::new(recorder, rate)) as Box<dyn Rs485Tap>;
-        drive.set_tap(recorder.map(tap));
+    fn listen(drive: &mut Rs485Loop, ears: Option<Arc<Ears>>, rate: BaudRate) {
+        let tap = |ears| Box::new(Telegrams::new(ears, rate)) as Box<dyn Rs485Tap>;
+        drive.set_tap(ears.map(tap));
     }
 }
 
@@ -229,10 +242,10 @@ impl Line<Profibus> for Wire<Member<Profibus>> {
         Self::run_until(self, until, observer);
     }
 
-    fn record(event: &rs485::Event, recorder: &BusRecorder) {
+    fn record(event: &rs485::Event, ears: &Ears) {
         if let rs485::Event::Telegram { octets, end, intact, .. } = event {
             let condition = if *intact { Condition::Intact } else { Condition::Broken };
-            recorder.telegram(*end, octets.octets(), condition, Direction::Received);
+            ears.telegram(*end, octets.octets(), condition, Direction::Received);
         }
     }
 
