@@ -12,11 +12,15 @@ const COAST = 120;
  * Where the shaft stands and where position 0 lies, as shares of a turn clockwise.
  * @param {object} device as the state tells it
  * @param {{steps: number}} fixed as the plant tells it
- * @returns {{shaft: number|null, zero: number|null, speed: number}} `speed` in rpm, clockwise
+ * @returns {{shaft: number|null, zero: number|null, speed: number}} `speed` in rpm, clockwise;
+ *   `null` where nobody knows, `zero` without power too
  */
 export function angles(device, { steps }) {
   if (!device?.power || typeof device.angle !== "number") {
-    return { shaft: null, zero: null, speed: 0 };
+    // A shaft turns without power too; only nobody measures it.
+    const code = device?.shaft?.code;
+    const known = typeof code === "number" && steps > 0;
+    return { shaft: known ? modulo(code / steps, 1) : null, zero: null, speed: 0 };
   }
   const clockwise = device.direction === "CCW" ? -1 : 1;
   const speed = (device.rpm ?? 0) * clockwise;
@@ -46,10 +50,9 @@ export function createSmallDial() {
     root,
     update(device, fixed) {
       const { shaft, zero: mark } = angles(device, fixed);
-      setAttribute(root, "data-off", shaft === null);
-      if (shaft === null) return;
-      needle.setAttribute("transform", `rotate(${(shaft * 360).toFixed(1)})`);
-      setAttribute(zero, "transform", `rotate(${(mark * 360).toFixed(1)})`);
+      setAttribute(root, "data-off", mark === null);
+      setAttribute(needle, "transform", `rotate(${((shaft ?? 0) * 360).toFixed(1)})`);
+      if (mark !== null) setAttribute(zero, "transform", `rotate(${(mark * 360).toFixed(1)})`);
     },
   };
 }
@@ -94,7 +97,7 @@ export function createLargeDial(shaft) {
       const next = angles(device, fixed);
       if (next.shaft !== last.shaft) since = performance.now();
       last = next;
-      setAttribute(root, "data-off", next.shaft === null);
+      setAttribute(root, "data-off", next.zero === null);
       setAttribute(root, "data-direction", device?.direction ?? "CW");
       if (next.zero !== null) setAttribute(zero, "transform", `rotate(${(next.zero * 360).toFixed(2)})`);
       const blur = Math.abs(next.speed) > BLUR_RPM;

@@ -59,5 +59,5 @@ export function createMemory({ device, locked, send }) {
 
 function why(locked, device) {
   if (locked) return locked;
-  return device.editable ? null : "A master of another plant sets this encoder: change it there.";
+  return device.editable ? null : device.why_not_editable ?? "It cannot be set here.";
 }
