@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use codewheel_capture::{ReadError, WriteError};
+use codewheel_dashboard::StartError as PageError;
 use codewheel_link::LinkError;
 use codewheel_plant::{MemoryError, PlantError, RecordError, StartError};
 use codewheel_sim::shaft::ShaftError;
@@ -21,6 +22,8 @@ pub(crate) enum Failure {
     Plant(#[from] PlantError),
     #[error(transparent)]
     Start(#[from] StartError),
+    #[error(transparent)]
+    Page(#[from] PageError),
     #[error(transparent)]
     Link(#[from] LinkError),
     #[error("cannot keep {}: {reason}; check that the folder is there and may be written", .path.display())]
@@ -57,6 +60,7 @@ impl Failure {
             Self::Usage(_)
             | Self::Shaft(_)
             | Self::Plant(PlantError::Wrong(_))
+            | Self::Page(PageError::NeedsToken(_))
             | Self::Start(
                 StartError::Memory(MemoryError::AnotherProduct { .. })
                 | StartError::Master(_)
@@ -66,6 +70,7 @@ impl Failure {
             | Self::Record(RecordError { reason: WriteError::Format(_), .. }) => 2,
             Self::Plant(PlantError::Read { .. })
             | Self::Start(_)
+            | Self::Page(_)
             | Self::Link(_)
             | Self::File { .. }
             | Self::Record(_)

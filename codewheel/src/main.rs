@@ -9,6 +9,7 @@ mod failure;
 mod files;
 mod hilo;
 mod models;
+mod page;
 mod record;
 mod replay;
 mod run;
@@ -28,10 +29,15 @@ use crate::failure::Failure;
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let chatter = arguments.chatter();
+    if let (Some(_), Some(option)) = (&arguments.verb, arguments.page.given()) {
+        return end(Err(Failure::Usage(format!(
+            "{option} without a verb is for the demo: write it behind `run`"
+        ))));
+    }
     let result = match arguments.verb {
         Some(Verb::Doctor(doctor)) => return end(doctor::run(&doctor)),
         Some(Verb::Replay(replay)) => return end(replay::run(&replay, chatter)),
-        None => run::demo(chatter),
+        None => run::demo(&arguments.page, chatter),
         Some(Verb::Run(arguments)) => run::run(&arguments, chatter),
         Some(Verb::Schema) => run::schema(),
         Some(Verb::Encoder(encoder)) => encoder::run(&encoder, chatter),

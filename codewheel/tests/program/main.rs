@@ -5,6 +5,7 @@ mod demo;
 mod descriptions;
 mod doctor;
 mod encoder;
+mod page;
 #[cfg(unix)]
 mod profibus;
 mod prompt;

@@ -127,6 +127,8 @@ impl Shared {
             let is_read = self.readers.load(Ordering::Relaxed) > 0;
             if is_read != fast {
                 fast = is_read;
+                // So the first frame waits for all buses too.
+                last = Instant::now();
                 plant.watch_every(watcher, if fast { FRAME } else { REPORTS });
                 if !fast {
                     // Whoever comes next must not see what was long ago; and the next frame must not

@@ -11,7 +11,7 @@ use super::clock::Clock;
 use super::event::{Event, Events};
 use super::judge::Awaited;
 use super::line::Line;
-use super::settings::{MasterSettings, SettingsError, SlaveSettings};
+use super::settings::{MasterSettings, SettingsError, SlaveSettings, USER_PARAMETER_OCTETS};
 use super::slave::{CycleTimes, Service, Slave, SlaveState, SlaveView, Validating};
 use super::telegram::Receiver;
 
@@ -51,6 +51,17 @@ pub enum NotSet {
         /// How many it has.
         expected: usize,
     },
+}
+
+/// Why user parameters are not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum NotParameterized {
+    /// No slave has this address.
+    #[error("the master has no slave {0}")]
+    UnknownSlave(u8),
+    /// They are too many.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
 }
 
 /// A PROFIBUS-DP master with up to 125 slaves.
@@ -171,6 +182,30 @@ impl Master {
         Ok(())
     }
 
+    /// Gives the slave at `address` other user parameters, octets 8 and following of Set_Prm, and
+    /// makes it ready anew with them as soon as it owes no answer. Until then
+    /// [`SlaveView::parameters_waiting`] is set.
+    ///
+    /// # Errors
+    /// [`NotParameterized`]; nothing is changed.
+    pub fn set_user_parameters(
+        &mut self,
+        address: u8,
+        user_parameters: Vec<u8>,
+    ) -> Result<(), NotParameterized> {
+        let slave = self
+            .slaves
+            .iter_mut()
+            .find(|slave| slave.settings.address == address)
+            .ok_or(NotParameterized::UnknownSlave(address))?;
+        let given = user_parameters.len();
+        if given > USER_PARAMETER_OCTETS {
+            return Err(SettingsError::UserParameters { address, given }.into());
+        }
+        slave.parameters_waiting = Some(user_parameters);
+        Ok(())
+    }
+
     /// Reads the diagnosis of the slave at `address` in place of its next Data_Exchange, which
     /// [`Event::Diagnosis`] reports.
     ///
@@ -215,6 +250,18 @@ impl Master {
             }
             if slave.validating.take_if(|validating| validating.is_hopeless(now)).is_some() {
                 self.dp.get_mut(slave.handle).reset_address(slave.settings.address);
+            }
+            if let Some(parameters) = slave.parameters_waiting.take() {
+                slave.settings.user_parameters = parameters;
+                // Another length needs another peripheral; a new one begins with the diagnosis.
+                *self.dp.get_mut(slave.handle) = Slave::peripheral(&slave.settings);
+                slave.outputs_waiting = true;
+                slave.refused = false;
+                slave.told = false;
+                slave.validating = None;
+                if slave.state != SlaveState::Absent {
+                    slave.state = SlaveState::Configuring;
+                }
             }
             if slave.outputs_waiting {
                 slave.outputs_waiting = false;

@@ -45,7 +45,7 @@ mod station;
 mod telegram;
 
 pub use event::{EVENTS, Event};
-pub use master::{Counters, Master, NotSet, UnknownSlave};
+pub use master::{Counters, Master, NotParameterized, NotSet, UnknownSlave};
 pub use settings::{
     DATA_OCTETS, HIGHEST_ADDRESS, LONGEST_SLOT, MasterSettings, SettingsError, SlaveSettings,
     USER_PARAMETER_OCTETS, shortest_slot,

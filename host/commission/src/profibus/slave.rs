@@ -105,6 +105,10 @@ pub struct SlaveView<'a> {
     pub input_at: Option<Instant>,
     /// The outputs that it gets.
     pub outputs: &'a [u8],
+    /// The user parameters that it gets, from its next Set_Prm on.
+    pub user_parameters: &'a [u8],
+    /// Whether it has yet to be made ready anew with them.
+    pub parameters_waiting: bool,
     /// Its latest diagnosis.
     pub diagnosis: Option<&'a Diagnosis>,
     /// Data exchanges completed.
@@ -205,6 +209,8 @@ pub(super) struct Slave {
     /// Outputs or a wish for the diagnosis wait for the next request.
     pub(super) outputs_waiting: bool,
     pub(super) diagnosis_waiting: bool,
+    /// Other user parameters wait until it owes no answer.
+    pub(super) parameters_waiting: Option<Vec<u8>>,
 }
 
 impl Slave {
@@ -225,6 +231,7 @@ impl Slave {
             validating: None,
             outputs_waiting: false,
             diagnosis_waiting: false,
+            parameters_waiting: None,
             settings,
         }
     }
@@ -264,6 +271,11 @@ impl Slave {
             inputs: &self.inputs,
             input_at: self.input_at,
             outputs: &self.outputs,
+            user_parameters: self
+                .parameters_waiting
+                .as_ref()
+                .unwrap_or(&self.settings.user_parameters),
+            parameters_waiting: self.parameters_waiting.is_some(),
             diagnosis: self.diagnosis.as_ref(),
             answers: self.answers,
             repetitions: self.repetitions,
