@@ -11,7 +11,6 @@ import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TextIO
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
@@ -23,39 +22,62 @@ WIDE = {"width": 1280, "height": 800}
 PHONE = {"width": 390, "height": 844}
 
 
-@contextlib.contextmanager
-def serving(program: Path, plant: Path, messages: TextIO, *options: str) -> Iterator[str]:
-    """Runs a plant with its page on a free port; yields the address of the page."""
-    arguments = [program, "run", plant, "--listen", "127.0.0.1:0", "--quiet", *options]
-    process = subprocess.Popen(
-        [str(argument) for argument in arguments],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=messages,
-    )
-    try:
-        yield address_of(process, Path(messages.name))
-    finally:
-        process.terminate()
-        try:
-            process.wait(5)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+class Served:
+    """The program with its page."""
 
-
-def address_of(process: subprocess.Popen[bytes], messages: Path) -> str:
-    """The address that the program tells in its messages."""
-    end = time.monotonic() + READY_SECONDS
-    while time.monotonic() < end:
-        if found := re.search(r"page (http://\S+)", messages.read_text()):
-            return found.group(1).rstrip("/")
-        if (status := process.poll()) is not None:
-            raise SystemExit(
-                f"the program left with exit status {status}:\n{messages.read_text()}"
+    def __init__(self, program: Path, plant: Path, log: Path, *options: str) -> None:
+        """Starts a plant with its page, at a free port unless `options` name one."""
+        where = () if "--listen" in options else ("--listen", "127.0.0.1:0")
+        arguments = [program, "run", plant, *where, *options]
+        self._log = log
+        with log.open("w") as messages:
+            self._process = subprocess.Popen(
+                [str(argument) for argument in arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=messages,
             )
-        time.sleep(0.05)
-    raise SystemExit(f"no page after {READY_SECONDS:g} s:\n{messages.read_text()}")
+        try:
+            self.address = self._told_address()
+        except BaseException:
+            self.end()
+            raise
+
+    def _told_address(self) -> str:
+        """Where the page is, as the program tells it in its messages."""
+        end = time.monotonic() + READY_SECONDS
+        while time.monotonic() < end:
+            told = self._log.read_text()
+            if found := re.search(r"page (http://\S+)", told):
+                return found.group(1).rstrip("/")
+            if (status := self._process.poll()) is not None:
+                raise SystemExit(f"the program left with exit status {status}:\n{told}")
+            time.sleep(0.05)
+        raise SystemExit(f"no page after {READY_SECONDS:g} s:\n{self._log.read_text()}")
+
+    @property
+    def port(self) -> int:
+        """The port of the page."""
+        return int(self.address.rsplit(":", 1)[1])
+
+    def exit_status(self) -> int | None:
+        """None while it runs."""
+        return self._process.poll()
+
+    def end(self) -> None:
+        """Leaves no process behind."""
+        self._process.terminate()
+        try:
+            self._process.wait(5)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def __enter__(self) -> Served:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
 
 
 @contextlib.contextmanager

@@ -141,7 +141,7 @@ function fact(name, value) {
 function createMaster({ id, address }) {
   const text = element("span", { class: "number" }, NOTHING);
   return {
-    root: fact(`${id} (${address})`, text),
+    root: fact(id.endsWith(` ${address}`) ? id : `${id} (${address})`, text),
     update(now) {
       if (!now) setText(text, NOTHING);
       else if (!now.on_line) setText(text, "off-line");

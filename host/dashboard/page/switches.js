@@ -17,15 +17,18 @@ export function createSwitches({ device, locked, send }) {
   const rotary = device.switches.rotary.map((fixed, place) =>
     createRotary(fixed, disabled, (digit) => put({ rotary: set.rotary.with(place, digit) })));
   const dip = device.switches.dip.map((fixed, place) =>
-    createDip(`DIP ${fixed.label}`, fixed.meaning, disabled, (on) => put({ dip: set.dip.with(place, on) })));
+    createDip(`DIP ${fixed.label}`, fixed.meaning?.split(":")[0], disabled, (on) => put({ dip: set.dip.with(place, on) })));
   const termination = createDip("Termination", "terminating resistor", disabled, (on) =>
     put({ termination: on }));
+  // "bit rate: 2 and 3 OFF OFF 125k, …" stands once for both switches, its first words at each.
+  const legend = new Set(device.switches.dip.map((fixed) => fixed.meaning).filter((text) => text?.includes(":")));
   const pending = element("p", { class: "pending" });
   const root = element(
     "div", { class: "switches" },
     element("h3", {}, "Switches"),
     element("div", { class: "rotaries" }, ...rotary.map((one) => one.root)),
     element("div", { class: "dips" }, ...dip.map((one) => one.root), termination.root),
+    ...[...legend].map((text) => element("p", { class: "hint" }, text)),
     pending, outcome.root,
   );
   return {
