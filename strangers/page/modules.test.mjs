@@ -70,6 +70,13 @@ test("a history keeps a minute, and what held when it began", () => {
   assert.equal(extremes(history.last(101, "position")).now, null);
 });
 
+test("a plant that starts anew has a history of its own", () => {
+  const history = new History();
+  history.push(50, { power: true, position: 7 });
+  history.push(0.5, { power: true, position: 8 });
+  assert.deepEqual(history.last(1, "position"), [{ at: 0.5, value: 8 }]);
+});
+
 test("the mark of position 0 stands still while the shaft turns, whatever the direction", () => {
   const at = (code, direction) => {
     const unwrapped = direction === "CW" ? code : -code;

@@ -19,6 +19,8 @@ export class History {
   /** Takes what the state tells at `at`, in seconds from the start of the plant. */
   push(at, device) {
     const before = (this.#end + ROOM - 1) % ROOM;
+    // A time that goes back is that of another run of the plant.
+    if (this.#length > 0 && at < this.#times[before]) this.#length = 0;
     const earlier = (this.#end + ROOM - 2) % ROOM;
     const close = this.#length > 1 && at - this.#times[earlier] < CLOSEST;
     const place = close ? before : this.#end;

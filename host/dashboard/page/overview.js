@@ -93,7 +93,7 @@ function createFilter(apply) {
 function show(cards, words, troubled) {
   for (const card of cards.values()) {
     const found = words.every((word) => card.words.includes(word));
-    setAttribute(card.root, "hidden", !found || (troubled && card.standing === "good"));
+    setAttribute(card.root, "hidden", !found || (troubled && FINE.includes(card.standing)));
   }
 }
 
@@ -152,13 +152,18 @@ function createMaster({ id, address }) {
 
 /** How an encoder stands, in the order in which it matters. */
 function standing(device) {
-  if (!device?.power) return "off";
+  if (!device) return "unknown";
+  if (!device.power) return "off";
   if (device.alarm) return "alarm";
   if (device.warning) return "warning";
   return device.faults?.length ? "fault" : "good";
 }
 
-const STANDINGS = { off: "no power", alarm: "alarm", warning: "warning", fault: "fault provoked", good: "" };
+/** What the badge of a card says. */
+const STANDINGS = {
+  unknown: "", off: "no power", alarm: "alarm", warning: "warning", fault: "fault provoked", good: "",
+};
+const FINE = ["good", "unknown"];
 
 function createCard(place, fixed_, readOnly) {
   const dial = createSmallDial();
@@ -187,7 +192,7 @@ function createCard(place, fixed_, readOnly) {
     power.outcome.root,
   );
   const card = {
-    root, place, standing: "off",
+    root, place, standing: "unknown",
     words: `${place.bus} ${fixed_.id} ${fixed_.model} ${fixed_.title}`.toLowerCase(),
     update(device) {
       dial.update(device, fixed_);
@@ -198,7 +203,7 @@ function createCard(place, fixed_, readOnly) {
       setText(turns, on ? whole(device.turns) : NOTHING);
       setText(speed, on ? fixed(device.rpm, 1) : NOTHING);
       setText(address, device?.address ?? NOTHING);
-      setText(state, on ? device.state ?? NOTHING : "no power");
+      setText(state, on ? device.state ?? NOTHING : device ? "no power" : NOTHING);
       setText(master, masterText(device?.master));
       card.standing = standing(device);
       setAttribute(root, "data-standing", card.standing);
@@ -218,12 +223,12 @@ function masterText(master) {
 function createPower(place, name, readOnly) {
   const outcome = new Outcome();
   let on = false;
+  const word = element("span", {}, "off");
   const root = element(
     "button",
-    { type: "button", class: "power", "aria-pressed": "false", "aria-label": `Power of ${name}`,
-      title: readOnly ? "The page is read-only." : "Power", disabled: readOnly,
-      onclick: () => send() },
-    "off",
+    { type: "button", class: "power", "aria-pressed": "false", disabled: readOnly,
+      title: readOnly ? "The page is read-only." : "Power", onclick: () => send() },
+    element("span", { class: "unseen" }, `Power of ${name} `), word,
   );
   async function send() {
     try {
@@ -240,7 +245,7 @@ function createPower(place, name, readOnly) {
     update(now) {
       on = now;
       setAttribute(root, "aria-pressed", String(on));
-      setText(root, on ? "on" : "off");
+      setText(word, on ? "on" : "off");
     },
   };
 }
