@@ -1,19 +1,26 @@
 //! A device in a plant: switched on or off, with its memory, its faults and what it has told.
 
+use std::sync::Arc;
+
 use codewheel_device::{Event, Snapshot};
-use codewheel_encoder::{Geometry, Start};
+use codewheel_encoder::{Block, Geometry, Start};
 use codewheel_link::Waker;
 use codewheel_sim::Drops;
+use codewheel_sim::shaft::{Faulty, Shaft};
 use codewheel_station::{Duration, Instant, Station, earlier};
 use fastrand::Rng;
 
 use crate::fault::{Action, Lever};
-use crate::field_bus::{FieldBus, Outfit, Powered, Switches};
+use crate::fault_kinds::{self, kind_of};
+use crate::field_bus::{Begun, Change, FieldBus, Outfit, Powered, Switches};
 use crate::keeper::Keeper;
 use crate::repeats::Repeats;
 use crate::report::{Report, Reports, What};
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, DeviceDescription, DevicePlan, MemoryError, StartError};
+use crate::{
+    BusPlan, Cause, DeviceDescription, DevicePlan, MemoryError, Refusal, StartError,
+    SwitchPositions,
+};
 
 /// A device with everything that outlives its power.
 #[derive(Debug)]
@@ -27,6 +34,17 @@ pub struct Device<B: FieldBus> {
     /// Trouble between the device and its bus, over power cuts.
     drops: Option<Drops>,
     delay: Duration,
+    /// How its shaft moves, as text.
+    motion: Arc<str>,
+    /// Whether it was turned by hand last, so that turning it further adds up.
+    by_hand: bool,
+    /// Where its switches stand.
+    switches: SwitchPositions,
+    /// Where they stood at the last power-up.
+    switches_in_force: SwitchPositions,
+    /// The rate of its switches is not that of the bus.
+    is_apart: bool,
+    rate: B::Rate,
 }
 
 #[derive(Debug)]
@@ -71,6 +89,12 @@ impl<B: FieldBus> Device<B> {
             random: Rng::with_seed(seed),
             drops: None,
             delay: Duration::ZERO,
+            motion: plan.shaft_text.as_str().into(),
+            by_hand: false,
+            switches: plan.switches.positions(),
+            switches_in_force: plan.switches.positions(),
+            is_apart: false,
+            rate: bus.bit_rate,
         })
     }
 
@@ -88,13 +112,121 @@ impl<B: FieldBus> Device<B> {
             dip: B::DIP.to_vec(),
             shaft_fixed: self.outfit.sensor.fixed(),
             settings_fixed: None,
-            faults: Vec::new(),
+            faults: fault_kinds::of(plan.product, &plan.sensor, self.outfit.simulated),
         }
     }
 
     /// What it measures with.
-    fn geometry(&self) -> Geometry {
-        self.outfit.sensor.geometry().unwrap_or(self.outfit.product.encoder.geometry)
+    pub(crate) fn geometry(&self) -> Geometry {
+        self.outfit.model().geometry
+    }
+
+    /// What observers of a wire call it.
+    pub(crate) fn label(&self) -> String {
+        format!("{} at {}", self.outfit.product.title, self.outfit.switches.position())
+    }
+
+    pub(crate) const fn outfit(&self) -> &Outfit<B> {
+        &self.outfit
+    }
+
+    pub(crate) fn sensor(&self) -> &PlantSensor {
+        match &self.power {
+            Power::On(encoder) => encoder.sensor(),
+            Power::Off(sensor) => sensor,
+        }
+    }
+
+    /// Has the shaft do something else from `now` on, in these words.
+    pub(crate) fn set_shaft(&mut self, now: Instant, shaft: Shaft, motion: &str, by_hand: bool) {
+        self.motion = motion.into();
+        self.by_hand = by_hand;
+        match &mut self.power {
+            Power::On(encoder) => {
+                // A device whose shaft rested has not looked at it for a while.
+                encoder.sensor_mut();
+                encoder.advance(now);
+                encoder.sensor_mut().set_shaft(shaft);
+            }
+            Power::Off(sensor) => sensor.set_shaft(shaft),
+        }
+    }
+
+    pub(crate) const fn motion(&self) -> &Arc<str> {
+        &self.motion
+    }
+
+    pub(crate) const fn is_by_hand(&self) -> bool {
+        self.by_hand
+    }
+
+    pub(crate) const fn switches(&self) -> &SwitchPositions {
+        &self.switches
+    }
+
+    /// Where the switches stood at the power-up that is in force, or will stand at the next one.
+    pub(crate) const fn switches_at_power_up(&self) -> &SwitchPositions {
+        match &self.power {
+            Power::On(_) => &self.switches_in_force,
+            Power::Off(_) => &self.switches,
+        }
+    }
+
+    /// Turns the switches; they act at the next power-up.
+    pub(crate) fn set_switches(&mut self, positions: SwitchPositions) {
+        let switches = B::Switches::at(&positions);
+        self.outfit.switches = switches;
+        self.switches = positions;
+        if let Power::On(encoder) = &mut self.power {
+            encoder.set_switches(switches);
+        }
+    }
+
+    /// Changes its settings, where they are its own.
+    pub(crate) fn change(&mut self, now: Instant, change: Change<'_>) -> Result<Begun, Refusal> {
+        let Power::On(encoder) = &mut self.power else {
+            let text = "the device has no power; nothing was changed: switch it on first";
+            return Err(Refusal::new(Cause::State, text));
+        };
+        let begun = encoder.change(now, change);
+        self.tend(now);
+        begun
+    }
+
+    /// What became of a Save of `block`; `None` as long as it is under way.
+    pub(crate) fn saved(&self, now: Instant, block: &Block) -> Option<Result<(), Refusal>> {
+        let failed = |text| Some(Err(Refusal::new(Cause::Failed, text)));
+        match &self.power {
+            Power::Off(_) => failed(
+                "the power was cut while the record was written: the next power-up shows whether \
+                 the old or the new settings are kept",
+            ),
+            Power::On(encoder) if encoder.is_saving() => None,
+            Power::On(encoder) if encoder.snapshot(now).saved == *block => Some(Ok(())),
+            Power::On(_) => failed("the memory did not take the record: save once more"),
+        }
+    }
+
+    /// Which kinds of faults it has now, power and bus apart.
+    pub(crate) fn faults(&self, faults: &mut Vec<&'static str>) {
+        let sensor = self.sensor();
+        if sensor.shaft().is_some_and(Faulty::is_cell_low) {
+            faults.push("cell-low");
+        }
+        if sensor.shaft().is_some_and(Faulty::is_stuck) {
+            faults.push("stuck");
+        }
+        let drops = match &self.power {
+            Power::On(encoder) => encoder.drops(),
+            Power::Off(_) => self.drops,
+        };
+        if drops.is_some_and(|drops| drops.count != Some(0)) {
+            faults.push("drop-answers");
+        }
+        if self.delay > Duration::ZERO {
+            faults.push("late-answers");
+        }
+        faults.extend(sensor.line_fault().map(kind_of));
     }
 
     /// Writes a memory file in a thread of its own from now on.
@@ -120,7 +252,22 @@ impl<B: FieldBus> Device<B> {
         encoder.set_drops(self.drops);
         encoder.set_delay(self.delay);
         self.power = Power::On(Box::new(encoder));
+        self.wake(now);
         self.listen();
+    }
+
+    /// What every power-up does: the switches are read.
+    fn wake(&mut self, now: Instant) {
+        self.switches_in_force.clone_from(&self.switches);
+        let apart = B::rate_apart(&self.outfit.switches, self.rate);
+        self.is_apart = apart.is_some();
+        if let Some(apart) = apart {
+            let text = format!(
+                "the switches say {apart} and the bus runs at {}: nobody hears the device",
+                self.rate
+            );
+            self.reports.push(now, What::Wiring(text));
+        }
     }
 
     /// Takes the power away, at any moment.
@@ -197,12 +344,22 @@ impl<B: FieldBus> Device<B> {
     /// Hears what the device has to tell.
     fn listen(&mut self) {
         let Power::On(encoder) = &mut self.power else { return };
+        let mut restarted = None;
         while let Some((at, event)) = encoder.take_event() {
+            if event == Event::PowerUp {
+                restarted = Some(at);
+            }
             match self.repeats.tell(at, event) {
                 None => {}
                 Some(1) => self.reports.push(at, What::Device(event)),
                 Some(count) => self.reports.push(at, What::Repeated { event, count }),
             }
+        }
+        // A reset over the bus is a power-up too.
+        if let Some(at) = restarted
+            && self.switches_in_force != self.switches
+        {
+            self.wake(at);
         }
     }
 
@@ -238,7 +395,9 @@ impl<B: FieldBus> Station for Device<B> {
     type Output = B::Output;
 
     fn handle(&mut self, now: Instant, input: B::Input<'_>) {
-        if let Power::On(encoder) = &mut self.power {
+        if let Power::On(encoder) = &mut self.power
+            && !self.is_apart
+        {
             encoder.handle(now, input);
             self.tend(now);
         }
@@ -253,6 +412,9 @@ impl<B: FieldBus> Station for Device<B> {
 
     fn transmit(&mut self, now: Instant) -> Option<B::Output> {
         let Power::On(encoder) = &mut self.power else { return None };
+        if self.is_apart {
+            return None;
+        }
         let output = encoder.transmit(now);
         self.hand_over_record(now);
         self.listen();

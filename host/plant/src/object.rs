@@ -1,6 +1,6 @@
 //! What can be read of a device, and set, whatever its bus.
 
-use crate::Value;
+use crate::{Cause, Refusal, Value};
 
 /// Objects that belong together.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,4 +48,32 @@ impl Object {
     pub const fn is_editable(&self) -> bool {
         self.why_not.is_none()
     }
+}
+
+/// The number that `value` is, or that has this name among `names`.
+///
+/// # Errors
+/// What is allowed, as a sentence without a full stop.
+pub(crate) fn number_of(value: &Value, names: &[&str]) -> Result<i64, String> {
+    let text = match value {
+        Value::Number(number) => return Ok(*number),
+        Value::Text(text) => text.trim(),
+    };
+    let place = names.iter().position(|name| !name.is_empty() && name.eq_ignore_ascii_case(text));
+    if let Some(number) = place.and_then(|place| i64::try_from(place).ok()) {
+        return Ok(number);
+    }
+    text.parse().map_err(|_| {
+        let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).copied().collect();
+        match names.as_slice() {
+            [] => "it is a number".to_owned(),
+            names => format!("it is {}, or their number", names.join(" or ")),
+        }
+    })
+}
+
+/// The refusal where a device has no such object.
+pub(crate) fn unknown(key: &str) -> Refusal {
+    let text = format!("the device has no object {key:?}: list its objects");
+    Refusal::new(Cause::Unknown, text)
 }

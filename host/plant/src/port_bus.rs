@@ -8,7 +8,7 @@ use codewheel_link::{Clock, LinkError, Waker};
 #[cfg(target_os = "linux")]
 use codewheel_spidev::CannotOpen;
 use codewheel_spidev::SsiUri;
-use codewheel_station::{Instant, earlier};
+use codewheel_station::{Duration, Instant, earlier};
 use thiserror::Error;
 
 use crate::crew::Crew;
@@ -119,8 +119,8 @@ impl<B: FieldBus> PortBus<B> {
     ///
     /// # Errors
     /// [`Refusal`] where there is no such device.
-    pub fn objects(&mut self, device: &str) -> Result<Vec<ObjectGroup>, Refusal> {
-        self.crew.objects(self.now(), device, &mut self.stations)
+    pub fn objects(&self, device: &str) -> Result<Vec<ObjectGroup>, Refusal> {
+        self.crew.objects(device, &self.stations)
     }
 
     /// One turn of the stations and the port: waits once, for input, a wake-up, a deadline, a fault
@@ -137,6 +137,11 @@ impl<B: FieldBus> PortBus<B> {
             self.crew.report(now, What::Port(notice));
         }
         Ok(())
+    }
+
+    /// Averages rates over so long a time at least, however often snapshots are made.
+    pub(crate) const fn set_window(&mut self, window: Duration) {
+        self.crew.set_window(window);
     }
 
     /// The bus now. What it reports is taken out.

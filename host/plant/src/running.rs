@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use std::time;
 
 use codewheel_link::{Clock, LinkError, Waker};
-use codewheel_station::Instant;
+use codewheel_station::{Duration, Instant};
 
 use crate::ears::Ears;
 use crate::field_bus::{FieldBus, Line};
@@ -22,6 +22,9 @@ use crate::{
 
 /// How often a virtual bus catches up with the clock on the wall.
 const PACE: time::Duration = time::Duration::from_millis(5);
+
+/// Rates are averaged over so long a time at least, however often somebody looks.
+const WINDOW: Duration = Duration::from_millis(500);
 
 /// How many commands wait for one bus at most.
 const WAITING: usize = 32;
@@ -196,7 +199,7 @@ struct Post {
 trait Served {
     fn command(&mut self, device: &str, command: &Command) -> Ticket;
     fn take_answer(&mut self, ticket: Ticket) -> Option<Result<Done, Refusal>>;
-    fn objects(&mut self, device: &str) -> Result<Vec<ObjectGroup>, Refusal>;
+    fn objects(&self, device: &str) -> Result<Vec<ObjectGroup>, Refusal>;
     fn snapshot(&mut self) -> BusSnapshot;
     fn finish(&mut self);
 }
@@ -212,7 +215,7 @@ macro_rules! served {
                 Self::take_answer(self, ticket)
             }
 
-            fn objects(&mut self, device: &str) -> Result<Vec<ObjectGroup>, Refusal> {
+            fn objects(&self, device: &str) -> Result<Vec<ObjectGroup>, Refusal> {
                 Self::objects(self, device)
             }
 
@@ -315,7 +318,8 @@ impl Running {
         let mut description = manned.describe();
         let (waker, thread) = match port {
             None => {
-                let bus = VirtualBus::begin(manned);
+                let mut bus = VirtualBus::begin(manned);
+                bus.set_window(WINDOW);
                 let run = move || {
                     post.run_virtual(bus);
                     Ok(())
@@ -323,7 +327,8 @@ impl Running {
                 (None, std::thread::spawn(run))
             }
             Some(port) => {
-                let bus = PortBus::begin(manned, port, post.clock);
+                let mut bus = PortBus::begin(manned, port, post.clock);
+                bus.set_window(WINDOW);
                 bus.uri().clone_into(&mut description.uri);
                 (Some(bus.waker()), std::thread::spawn(move || post.run_port(bus)))
             }

@@ -20,8 +20,8 @@ pub struct BusSnapshot {
     pub bit_rate: String,
     /// When, from the start of the plant.
     pub at: Instant,
-    /// The share of the time since the snapshot before in which the wire was not idle, 0 … 1;
-    /// `None` where nobody can tell.
+    /// The share of the time since the snapshot before in which the wire was not idle, 0 … 1; `None`
+    /// where nobody can tell. Of a [`Running`](crate::Running) plant it is half a second at least.
     pub load: Option<f64>,
     /// Its masters.
     pub masters: Vec<MasterSnapshot>,
@@ -194,7 +194,8 @@ pub struct SlaveSnapshot {
     pub state: SlaveState,
     /// The position as the master got it last; `None` before the first answer.
     pub position: Option<u32>,
-    /// Answers a second since the snapshot before.
+    /// Answers a second since the snapshot before; of a [`Running`](crate::Running) plant over half a
+    /// second at least.
     pub answers_per_second: f64,
     /// The cycles of this master.
     pub cycle: CycleTimes,

@@ -1,6 +1,8 @@
 //! DeviceNet in a plant.
 
+mod changes;
 mod composite;
+mod objects;
 mod plan;
 mod scanner;
 
@@ -19,10 +21,13 @@ use codewheel_station::{Duration, Instant};
 use self::composite::Composite;
 use crate::crew::{Medium, Member};
 use crate::ears::Ears;
-use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
+use crate::field_bus::{Begun, Change, FieldBus, Line, Outfit, Powered, Shared, Switches};
 use crate::recording::Frames;
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, DipSwitch, MemoryError, RotarySwitch, StartError};
+use crate::{
+    BusPlan, DipSwitch, MemoryError, ObjectGroup, Refusal, RotarySwitch, StartError,
+    SwitchPositions,
+};
 
 pub use plan::{Exchange, MasterPlan, SlavePlan};
 
@@ -71,6 +76,18 @@ impl FieldBus for DeviceNet {
         BitRate::ALL.iter().map(ToString::to_string).collect()
     }
 
+    fn rate_apart(switches: &Self::Switches, rate: BitRate) -> Option<BitRate> {
+        Some(switches.bit_rate()).filter(|switched| *switched != rate)
+    }
+
+    fn objects(
+        outfit: &Outfit<Self>,
+        encoder: Option<&Self::Encoder>,
+        _: Option<(&Scanner, u8)>,
+    ) -> Vec<ObjectGroup> {
+        objects::objects(outfit, encoder.map(Troubled::station))
+    }
+
     fn make_master(plan: &MasterPlan, place: usize) -> Result<Scanner, StartError> {
         Ok(scanner::scanner(plan, place))
     }
@@ -112,6 +129,19 @@ impl Switches for codewheel_device::Switches {
     fn termination(&self) -> bool {
         self.termination
     }
+
+    fn positions(&self) -> SwitchPositions {
+        let Self { rotary_1, rotary_2, dip_2, dip_3, termination } = *self;
+        let dip = vec![false, dip_2, dip_3];
+        SwitchPositions { rotary: [rotary_1, rotary_2], dip, termination }
+    }
+
+    fn at(positions: &SwitchPositions) -> Self {
+        let [rotary_1, rotary_2] = positions.rotary;
+        let dip = |number: usize| positions.dip.get(number - 1).copied().unwrap_or_default();
+        let termination = positions.termination;
+        Self { rotary_1, rotary_2, dip_2: dip(2), dip_3: dip(3), termination }
+    }
 }
 
 impl Powered<DeviceNet> for Troubled<DeviceNetEncoder<PlantSensor>> {
@@ -126,6 +156,10 @@ impl Powered<DeviceNet> for Troubled<DeviceNetEncoder<PlantSensor>> {
         let factory = Factory::with_serial(*serial);
         let encoder = DeviceNetEncoder::power_up(now, product, factory, *switches, memory, sensor);
         Self::new(encoder, seed)
+    }
+
+    fn sensor(&self) -> &PlantSensor {
+        self.station().sensor()
     }
 
     fn sensor_mut(&mut self) -> &mut PlantSensor {
@@ -146,6 +180,18 @@ impl Powered<DeviceNet> for Troubled<DeviceNetEncoder<PlantSensor>> {
 
     fn snapshot(&self, now: Instant) -> Snapshot {
         self.station().snapshot(now)
+    }
+
+    fn set_switches(&mut self, switches: codewheel_device::Switches) {
+        self.station_mut().set_switches(switches);
+    }
+
+    fn change(&mut self, now: Instant, change: Change<'_>) -> Result<Begun, Refusal> {
+        changes::change(self.station_mut(), now, change)
+    }
+
+    fn is_saving(&self) -> bool {
+        self.station().is_saving()
     }
 
     fn drops(&self) -> Option<Drops> {
@@ -201,6 +247,10 @@ impl Line<DeviceNet> for Wire<Member<DeviceNet>> {
 
     fn bus_off(&mut self, id: NodeId) {
         Self::bus_off(self, id, &mut |_| {});
+    }
+
+    fn set_terminated(&mut self, id: NodeId, terminated: bool) {
+        Self::set_terminated(self, id, terminated);
     }
 
     fn set_corruption_at(&mut self, id: NodeId, probability: Option<f64>) {

@@ -1,15 +1,18 @@
 //! PROFIBUS-DP in a plant.
 
+mod changes;
 mod composite;
 mod dp_master;
+mod objects;
 mod plan;
+mod presets;
 
 use std::sync::Arc;
 
 use codewheel_capture::{self as capture, Condition, Direction};
 use codewheel_device::profibus::Factory;
 use codewheel_device::{Event, ProfibusEncoder, Snapshot, product};
-use codewheel_encoder::{Kept, Model, Start};
+use codewheel_encoder::{Kept, Start};
 use codewheel_link::{
     BusUri, Clock, LinkError, Notice, Rs485Loop, Rs485Port, Rs485Tap, Waker, open_rs485,
 };
@@ -24,10 +27,13 @@ use self::dp_master::DpMaster;
 use crate::check::baud_rate;
 use crate::crew::{Medium, Member};
 use crate::ears::Ears;
-use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
+use crate::field_bus::{Begun, Change, FieldBus, Line, Outfit, Powered, Shared, Switches};
 use crate::recording::Telegrams;
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, DipSwitch, MemoryError, RotarySwitch, StartError};
+use crate::{
+    BusPlan, Cause, DipSwitch, MemoryError, ObjectGroup, Refusal, RotarySwitch, StartError,
+    SwitchPositions,
+};
 
 pub use plan::{DeviceOptions, DpMasterPlan, DpSlavePlan, PresetPlan};
 
@@ -79,6 +85,19 @@ impl FieldBus for Profibus {
         BaudRate::ALL.iter().map(ToString::to_string).collect()
     }
 
+    fn rate_apart(_: &Self::Switches, _: BaudRate) -> Option<BaudRate> {
+        None
+    }
+
+    fn objects(
+        outfit: &Outfit<Self>,
+        encoder: Option<&Self::Encoder>,
+        master: Option<(&DpMaster, u8)>,
+    ) -> Vec<ObjectGroup> {
+        let told = master.and_then(|(master, address)| master.user_parameters(address));
+        objects::objects(outfit, encoder.map(Troubled::station), told)
+    }
+
     fn make_master(plan: &DpMasterPlan, _: usize) -> Result<DpMaster, StartError> {
         Ok(DpMaster::new(plan)?)
     }
@@ -127,6 +146,16 @@ impl Switches for codewheel_device::profibus::Switches {
     fn termination(&self) -> bool {
         self.termination
     }
+
+    fn positions(&self) -> SwitchPositions {
+        let Self { rotary_1, rotary_2, termination } = *self;
+        SwitchPositions { rotary: [rotary_1, rotary_2], dip: Vec::new(), termination }
+    }
+
+    fn at(positions: &SwitchPositions) -> Self {
+        let [rotary_1, rotary_2] = positions.rotary;
+        Self { rotary_1, rotary_2, termination: positions.termination }
+    }
 }
 
 impl Powered<Profibus> for Troubled<ProfibusEncoder<PlantSensor>> {
@@ -138,15 +167,18 @@ impl Powered<Profibus> for Troubled<ProfibusEncoder<PlantSensor>> {
         seed: u64,
     ) -> Self {
         let Outfit { product, switches, options, rate, simulated, serial, .. } = outfit;
-        let geometry = outfit.sensor.geometry().unwrap_or(product.encoder.geometry);
         let factory = Factory {
-            model: Model { geometry, ..product.encoder },
+            model: outfit.model(),
             serial: *serial,
             baud: if options.auto_baud { Baud::Search } else { Baud::Fixed(*rate) },
             timing: if *simulated { Timing::Exact } else { Timing::Coarse },
         };
         let encoder = ProfibusEncoder::power_up(now, product, factory, *switches, memory, sensor);
         Self::new(encoder, seed)
+    }
+
+    fn sensor(&self) -> &PlantSensor {
+        self.station().sensor()
     }
 
     fn sensor_mut(&mut self) -> &mut PlantSensor {
@@ -167,6 +199,28 @@ impl Powered<Profibus> for Troubled<ProfibusEncoder<PlantSensor>> {
 
     fn snapshot(&self, now: Instant) -> Snapshot {
         self.station().snapshot(now)
+    }
+
+    fn set_switches(&mut self, switches: codewheel_device::profibus::Switches) {
+        self.station_mut().set_switches(switches);
+    }
+
+    /// Only its master can, and this plant has none that serves it.
+    fn change(&mut self, _: Instant, change: Change<'_>) -> Result<Begun, Refusal> {
+        let what = match change {
+            Change::Preset(_) => "a preset comes",
+            _ => "parameters come",
+        };
+        let text = format!(
+            "nothing was changed: on PROFIBUS {what} from the master, and no master of this plant \
+             serves the device at this address; change it there"
+        );
+        Err(Refusal::new(Cause::Impossible, text))
+    }
+
+    /// Nobody asks for it on this bus.
+    fn is_saving(&self) -> bool {
+        false
     }
 
     fn drops(&self) -> Option<Drops> {
@@ -232,6 +286,10 @@ impl Line<Profibus> for Wire<Member<Profibus>> {
 
     fn bus_off(&mut self, _: NodeId) {
         // A plan has this for CAN only: an RS-485 station has no controller that gives up.
+    }
+
+    fn set_terminated(&mut self, id: NodeId, terminated: bool) {
+        Self::set_terminated(self, id, terminated);
     }
 
     fn set_corruption_at(&mut self, id: NodeId, probability: Option<f64>) {

@@ -132,7 +132,7 @@ fn turning_adds_up_to_the_step_whatever_fraction_of_one_it_is_broken_off_at() {
     for _ in 0..1_000 {
         let steps = turned.steps_left(now) + 3;
         turned = turned.turned(now, steps, Duration::from_micros(50_000));
-        now = now + Duration::from_micros(7_777);
+        now += Duration::from_micros(7_777);
     }
     assert_eq!(turned.code(seconds(60)), begin + 3_000);
 }
