@@ -266,10 +266,14 @@ class PageWalk(Steps):
         return f"777 before and after; writes {before} → {number(writes)}"
 
     def refuses_in_words(self) -> str:
-        self.preset("99999999999")
-        first = until("refusal", lambda: self.outcome("Preset and memory"), lambda text: text.startswith("Refused"))
-        expect("position", number(self.position), 777)
-        return repr(first)
+        seen = []
+        for value in ("999999999", "99999999999", "a lot"):
+            self.preset(value)
+            told = until("refusal", lambda: self.outcome("Preset and memory"),
+                         lambda text, value=value: text.startswith("Refused") and value in text)
+            seen.append(repr(told))
+            expect("position", number(self.position), 777)
+        return ", ".join(seen)
 
     def power_without_switching_shows_the_shaft_all_the_same(self) -> str:
         seen = self.needle()

@@ -208,7 +208,7 @@ function createCard(place, fixed_, readOnly) {
       card.standing = standing(device);
       setAttribute(root, "data-standing", card.standing);
       setText(alarm, STANDINGS[card.standing]);
-      power.update(Boolean(on));
+      power.update(device ? Boolean(on) : null);
     },
   };
   return card;
@@ -222,11 +222,11 @@ function masterText(master) {
 
 function createPower(place, name, readOnly) {
   const outcome = new Outcome();
-  let on = false;
-  const word = element("span", {}, "off");
+  let on = null;
+  const word = element("span", {}, NOTHING);
   const root = element(
     "button",
-    { type: "button", class: "power", "aria-pressed": "false", disabled: readOnly,
+    { type: "button", class: "power", "aria-pressed": "false", disabled: true,
       title: readOnly ? "The page is read-only." : "Power", onclick: () => send() },
     element("span", { class: "unseen" }, `Power of ${name} `), word,
   );
@@ -244,8 +244,9 @@ function createPower(place, name, readOnly) {
     outcome,
     update(now) {
       on = now;
-      setAttribute(root, "aria-pressed", String(on));
-      setText(word, on ? "on" : "off");
+      setAttribute(root, "aria-pressed", String(Boolean(on)));
+      setAttribute(root, "disabled", readOnly || on === null);
+      setText(word, on === null ? NOTHING : on ? "on" : "off");
     },
   };
 }
