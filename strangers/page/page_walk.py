@@ -25,19 +25,21 @@ from functools import partial
 from pathlib import Path
 
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Locator, Page
+from playwright.sync_api import Browser, CDPSession, Locator, Page
 from playwright.sync_api import Error as BrowserError
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
 from browser import PHONE, WIDE, Served, chromium, opened  # noqa: E402
-from steps import Steps, Wrong, arguments_of, expect, expect_within  # noqa: E402
+from steps import Steps, Wrong, arguments_of, expect, expect_within, in_three_attempts  # noqa: E402
 
 STEPS = 8192
 PATIENCE = 5.0
 LATENCY_MS = 150
 HUNDRED = 100
+# With a hundred encoders: two pictures may be missed now and then, and half a core is enough.
+FRAME_MS, SHARE = 50, 0.5
 
 
 def number(locator: Locator) -> int | None:
@@ -57,6 +59,12 @@ def until(what: str, seen: Callable[[], object], wanted: object, seconds: float 
             asked = "something else" if callable(wanted) else repr(wanted)
             raise Wrong(f"{what}: expected {asked} within {seconds:g} s, got {now!r}")
         time.sleep(0.03)
+
+
+def spent(metrics: CDPSession) -> float:
+    """Seconds of a processor that the main thread of the page has taken."""
+    told = metrics.send("Performance.getMetrics")["metrics"]
+    return next(metric["value"] for metric in told if metric["name"] == "TaskDuration")
 
 
 class PageWalk(Steps):
@@ -519,31 +527,37 @@ class Surroundings(Steps):
             page = opened(self.browser, served.address)
             until("cards", page.locator(".card").count, HUNDRED)
             time.sleep(2)
-            seen = page.evaluate(
-                """() => new Promise((done) => {
-                    const long = [];
-                    new PerformanceObserver((list) => long.push(...list.getEntries().map((e) => e.duration)))
-                        .observe({ entryTypes: ["longtask"] });
-                    const gaps = [];
-                    const begin = performance.now();
-                    let last = begin;
-                    const picture = (now) => {
-                        gaps.push(now - last);
-                        last = now;
-                        if (now - begin < 5000) requestAnimationFrame(picture);
-                        else done({ long, gaps: gaps.sort((a, b) => a - b) });
-                    };
-                    requestAnimationFrame(picture);
-                })"""
-            )
+            told = in_three_attempts(partial(self.fluid, page))
             moved = page.locator(".card .big").first
             before = number(moved)
             until("a position", lambda: number(moved), lambda now: now != before)
             page.context.close()
-        gaps = seen["gaps"]
+        return told
+
+    def fluid(self, page: Page) -> str:
+        """What the pictures of five seconds cost, in time of the processor and on the wall."""
+        metrics = page.context.new_cdp_session(page)
+        metrics.send("Performance.enable", {"timeDomain": "threadTicks"})
+        begin = spent(metrics)
+        gaps = page.evaluate(
+            """() => new Promise((done) => {
+                const gaps = [];
+                const begin = performance.now();
+                let last = begin;
+                const picture = (now) => {
+                    gaps.push(now - last);
+                    last = now;
+                    if (now - begin < 5000) requestAnimationFrame(picture);
+                    else done(gaps.sort((a, b) => a - b));
+                };
+                requestAnimationFrame(picture);
+            })"""
+        )
+        share = (spent(metrics) - begin) / 5
         median, late = statistics.median(gaps), gaps[int(len(gaps) * 0.95)]
-        told = f"picture every {median:.1f} ms, 95 % within {late:.1f} ms, long tasks {[round(t) for t in seen['long']]}"
-        if late > 50 or len(seen["long"]) > 3:
+        told = (f"picture every {median:.1f} ms, 95 % within {late:.1f} ms, "
+                f"main thread {share * 100:.0f} % of a core")
+        if late > FRAME_MS or share > SHARE:
             raise Wrong(told)
         return told
 
