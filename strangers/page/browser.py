@@ -25,14 +25,17 @@ PHONE = {"width": 390, "height": 844}
 class Served:
     """The program with its page."""
 
-    def __init__(self, program: Path, plant: Path, log: Path, *options: str) -> None:
-        """Starts a plant with its page, at a free port unless `options` name one."""
+    def __init__(
+        self, program: Path, plant: Path, log: Path, *options: str, folder: Path | None = None
+    ) -> None:
+        """Starts a plant with its page, at a free port unless `options` name one, in `folder`."""
         where = () if "--listen" in options else ("--listen", "127.0.0.1:0")
-        arguments = [program, "run", plant, *where, *options]
+        arguments = [program.absolute(), "run", plant, *where, *options]
         self._log = log
         with log.open("w") as messages:
             self._process = subprocess.Popen(
                 [str(argument) for argument in arguments],
+                cwd=folder,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=messages,

@@ -66,8 +66,11 @@ test("a history keeps a minute, and what held when it began", () => {
   assert.equal(samples.at(-1).value, 1000);
   assert.ok(samples[0].at <= 40 && samples[1].at >= 40);
   assert.deepEqual(extremes(history.last(100, "polled")), { min: 39.5, max: 100, now: 100 });
-  history.push(101, { power: false });
-  assert.equal(extremes(history.last(101, "position")).now, null);
+  // However often it is told.
+  for (let at = 101; at <= 201; at += 0.05) history.push(at, { power: true, position: at });
+  assert.ok(history.last(201, "position")[0].at <= 141.1);
+  history.push(202, { power: false });
+  assert.equal(extremes(history.last(202, "position")).now, null);
 });
 
 test("a plant that starts anew has a history of its own", () => {

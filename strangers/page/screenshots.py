@@ -12,12 +12,14 @@ Runs the demo plant, lets it turn for some seconds and takes the overview and on
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import tempfile
 import time
 from pathlib import Path
 
 from PIL import Image
+from playwright.sync_api import Page
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
@@ -27,14 +29,27 @@ from steps import default_program  # noqa: E402
 
 ROOT = HERE.parents[1]
 IMAGES = ROOT / "docs" / "images"
+STEPS = 8192
 SIZE = {"width": 1280, "height": 800}
 
 
 def make_small(path: Path) -> None:
-    """Leaves a picture as many colours as a flat page needs, which is a quarter of the octets."""
+    """Leaves a picture as many colours as a flat page needs, which is a third of the octets."""
     with Image.open(path) as picture:
-        small = picture.convert("RGB").quantize(96, dither=Image.Dither.NONE)
+        small = picture.convert("RGB").quantize(
+            160, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+        )
     small.save(path, optimize=True)
+
+
+def into_the_middle(page: Page) -> None:
+    """Presets an encoder that swings around 0 so that its curve does not wrap."""
+    shown = page.locator(".position-own .huge .number").inner_text()
+    position = int(re.sub(r"\s", "", shown))
+    field = page.get_by_label("The position here becomes")
+    field.fill(str((position + STEPS // 2) % STEPS))
+    field.press("Enter")
+    field.blur()
 
 
 def main() -> int:
@@ -42,11 +57,12 @@ def main() -> int:
     parser.add_argument("program", nargs="?", type=Path, default=default_program())
     parser.add_argument("--seconds", type=float, default=60, help="how long the trend becomes")
     arguments = parser.parse_args()
-    plant = ROOT / "examples" / "demo.toml"
+    # The page shows the name of the file as it was given.
+    plant = Path("examples/demo.toml")
     with (
         tempfile.TemporaryDirectory() as folder,
         chromium() as browser,
-        Served(arguments.program, plant, Path(folder) / "messages.log") as served,
+        Served(arguments.program, plant, Path(folder) / "messages.log", folder=ROOT) as served,
     ):
         pages = []
         for scheme in ("light", "dark"):
@@ -56,6 +72,7 @@ def main() -> int:
             encoder.locator(".card h3 a").nth(1).click()
             encoder.wait_for_selector(".object-table")
             pages += [(f"page-overview-{scheme}", overview), (f"page-encoder-{scheme}", encoder)]
+        into_the_middle(pages[1][1])
         time.sleep(arguments.seconds)
         for name, page in pages:
             path = IMAGES / f"{name}.png"
