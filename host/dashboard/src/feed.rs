@@ -17,11 +17,13 @@ use crate::merge_patch;
 use crate::view::{BusState, ReportDocument, StateDocument};
 
 /// How often there is a new frame while somebody looks.
-pub(crate) const FRAME: Duration = Duration::from_millis(50);
+const FRAME: Duration = Duration::from_millis(50);
 /// How often the reports are taken while nobody looks.
 const REPORTS: Duration = Duration::from_secs(1);
 /// The longest time until a first reader, or the end, is noticed.
 const PATIENCE: Duration = Duration::from_millis(100);
+/// The longest that the first frame waits for all buses.
+const FIRST_FRAME: Duration = Duration::from_millis(300);
 /// Reports that a new reader gets to see.
 const JOURNAL: usize = 200;
 /// Readers at the same time.
@@ -122,12 +124,12 @@ impl Shared {
     fn look(&self, plant: &Running, watcher: &Watcher) {
         let mut fast = false;
         let mut number = 0;
+        let buses = plant.descriptions().len();
         let mut last = Instant::now();
         while !self.stop.load(Ordering::Relaxed) {
             let is_read = self.readers.load(Ordering::Relaxed) > 0;
             if is_read != fast {
                 fast = is_read;
-                // So the first frame waits for all buses too.
                 last = Instant::now();
                 plant.watch_every(watcher, if fast { FRAME } else { REPORTS });
                 if !fast {
@@ -145,15 +147,23 @@ impl Shared {
                 }
                 continue;
             }
-            if fast {
+            let before = self.frames.borrow().clone();
+            if fast && before.is_none() {
+                // Whoever comes first gets to see all buses, but does not wait for a lost one.
+                let missing = |fresh: &[(usize, BusSnapshot)]| {
+                    (0..buses).any(|bus| fresh.iter().all(|(at, _)| *at != bus))
+                };
+                while missing(&fresh) && last.elapsed() < FIRST_FRAME && !watcher.has_ended() {
+                    fresh.extend(watcher.snapshots(FIRST_FRAME.saturating_sub(last.elapsed())));
+                }
+            } else if fast {
                 // The buses run on their own; what they show within a frame is one frame.
-                std::thread::sleep((FRAME * 9 / 10).saturating_sub(last.elapsed()));
-                last = Instant::now();
+                std::thread::sleep(FRAME.saturating_sub(last.elapsed()));
                 fresh.extend(watcher.snapshots(Duration::ZERO));
             }
             self.note(&fresh);
             if fast {
-                let before = self.frames.borrow().clone();
+                last = Instant::now();
                 let frame = Frame::after(before.as_deref(), number, &fresh);
                 number += 1;
                 self.frames.send_replace(Some(Arc::new(frame)));

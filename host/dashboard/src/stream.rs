@@ -16,7 +16,7 @@ use tokio::task::JoinHandle;
 use tokio::time::Instant;
 use utoipa::{IntoParams, ToSchema};
 
-use crate::feed::{FRAME, READERS, Reader};
+use crate::feed::{READERS, Reader};
 use crate::problem::Problem;
 use crate::server::Shared;
 use crate::view::{GroupDocument, ReportDocument, StateDocument, TraceDocument, ValueDocument};
@@ -139,8 +139,8 @@ impl EventStream {
             }
             self.reader.changed().await;
             tokio::time::sleep_until(self.next).await;
-            // Frames come a little early or late; none is left out for that.
-            self.next = Instant::now() + self.pause - FRAME / 5;
+            // In the long run no more than was asked for; one that came late is not made up for.
+            self.next = (self.next + self.pause).max(Instant::now());
             self.gather();
         }
     }
