@@ -1,6 +1,7 @@
 //! Who is on a bus, whatever the bus is: devices, masters, what is done to them and what they show.
 
 mod commands;
+mod shaft;
 
 use std::collections::BTreeMap;
 
@@ -240,6 +241,21 @@ impl<B: FieldBus> Crew<B> {
                 Action::End(lever) => What::FaultEnds(lever.to_string()),
             };
             device.report(now, what);
+        }
+    }
+
+    /// Plugs those in anew that have another address after a reset over the bus.
+    pub(crate) fn follow_switches(&mut self, medium: &mut impl Medium<B>) {
+        for place in 0..self.devices.len() {
+            if !medium.station(place).and_then(Member::device).is_some_and(Device::has_moved) {
+                continue;
+            }
+            let Some(mut member) = medium.unplug(place) else { continue };
+            if let Some(device) = member.device_mut() {
+                device.settle();
+                medium.label(place, device.label(), device.switches().termination);
+            }
+            medium.plug_in(place, member);
         }
     }
 

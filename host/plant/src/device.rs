@@ -1,26 +1,25 @@
 //! A device in a plant: switched on or off, with its memory, its faults and what it has told.
 
+mod hands;
+mod state;
+
 use std::sync::Arc;
 
 use codewheel_device::{Event, Snapshot};
-use codewheel_encoder::{Block, Geometry, Start};
+use codewheel_encoder::{Geometry, Start};
 use codewheel_link::Waker;
 use codewheel_sim::Drops;
-use codewheel_sim::shaft::{Faulty, Shaft};
 use codewheel_station::{Duration, Instant, Station, earlier};
 use fastrand::Rng;
 
 use crate::fault::{Action, Lever};
-use crate::fault_kinds::{self, kind_of};
-use crate::field_bus::{Begun, Change, FieldBus, Outfit, Powered, Switches};
+use crate::fault_kinds;
+use crate::field_bus::{FieldBus, Outfit, Powered, Switches};
 use crate::keeper::Keeper;
 use crate::repeats::Repeats;
 use crate::report::{Report, Reports, What};
 use crate::sensor::PlantSensor;
-use crate::{
-    BusPlan, Cause, DeviceDescription, DevicePlan, MemoryError, Refusal, StartError,
-    SwitchPositions,
-};
+use crate::{BusPlan, DeviceDescription, DevicePlan, MemoryError, StartError, SwitchPositions};
 
 /// A device with everything that outlives its power.
 #[derive(Debug)]
@@ -44,6 +43,8 @@ pub struct Device<B: FieldBus> {
     switches_in_force: SwitchPositions,
     /// The rate of its switches is not that of the bus.
     is_apart: bool,
+    /// It has been reset over the bus, and its switches had been turned.
+    has_moved: bool,
     rate: B::Rate,
 }
 
@@ -94,12 +95,13 @@ impl<B: FieldBus> Device<B> {
             switches: plan.switches.positions(),
             switches_in_force: plan.switches.positions(),
             is_apart: false,
+            has_moved: false,
             rate: bus.bit_rate,
         })
     }
 
-    /// What does not change of it, as `plan` says it.
-    pub(crate) fn describe(&self, plan: &DevicePlan<B>) -> DeviceDescription {
+    /// What does not change of it, as `plan` says it; `is_served`: by a master of this plant.
+    pub(crate) fn describe(&self, plan: &DevicePlan<B>, is_served: bool) -> DeviceDescription {
         let geometry = self.geometry();
         DeviceDescription {
             name: plan.name.clone(),
@@ -111,7 +113,7 @@ impl<B: FieldBus> Device<B> {
             rotary: B::ROTARY,
             dip: B::DIP.to_vec(),
             shaft_fixed: self.outfit.sensor.fixed(),
-            settings_fixed: None,
+            settings_fixed: B::settings_fixed(is_served),
             faults: fault_kinds::of(plan.product, &plan.sensor, self.outfit.simulated),
         }
     }
@@ -119,6 +121,16 @@ impl<B: FieldBus> Device<B> {
     /// What it measures with.
     pub(crate) fn geometry(&self) -> Geometry {
         self.outfit.model().geometry
+    }
+
+    /// Whether it may have another address than when it was plugged in.
+    pub(crate) const fn has_moved(&self) -> bool {
+        self.has_moved
+    }
+
+    /// It is plugged in anew.
+    pub(crate) const fn settle(&mut self) {
+        self.has_moved = false;
     }
 
     /// What observers of a wire call it.
@@ -134,21 +146,6 @@ impl<B: FieldBus> Device<B> {
         match &self.power {
             Power::On(encoder) => encoder.sensor(),
             Power::Off(sensor) => sensor,
-        }
-    }
-
-    /// Has the shaft do something else from `now` on, in these words.
-    pub(crate) fn set_shaft(&mut self, now: Instant, shaft: Shaft, motion: &str, by_hand: bool) {
-        self.motion = motion.into();
-        self.by_hand = by_hand;
-        match &mut self.power {
-            Power::On(encoder) => {
-                // A device whose shaft rested has not looked at it for a while.
-                encoder.sensor_mut();
-                encoder.advance(now);
-                encoder.sensor_mut().set_shaft(shaft);
-            }
-            Power::Off(sensor) => sensor.set_shaft(shaft),
         }
     }
 
@@ -170,63 +167,6 @@ impl<B: FieldBus> Device<B> {
             Power::On(_) => &self.switches_in_force,
             Power::Off(_) => &self.switches,
         }
-    }
-
-    /// Turns the switches; they act at the next power-up.
-    pub(crate) fn set_switches(&mut self, positions: SwitchPositions) {
-        let switches = B::Switches::at(&positions);
-        self.outfit.switches = switches;
-        self.switches = positions;
-        if let Power::On(encoder) = &mut self.power {
-            encoder.set_switches(switches);
-        }
-    }
-
-    /// Changes its settings, where they are its own.
-    pub(crate) fn change(&mut self, now: Instant, change: Change<'_>) -> Result<Begun, Refusal> {
-        let Power::On(encoder) = &mut self.power else {
-            let text = "the device has no power; nothing was changed: switch it on first";
-            return Err(Refusal::new(Cause::State, text));
-        };
-        let begun = encoder.change(now, change);
-        self.tend(now);
-        begun
-    }
-
-    /// What became of a Save of `block`; `None` as long as it is under way.
-    pub(crate) fn saved(&self, now: Instant, block: &Block) -> Option<Result<(), Refusal>> {
-        let failed = |text| Some(Err(Refusal::new(Cause::Failed, text)));
-        match &self.power {
-            Power::Off(_) => failed(
-                "the power was cut while the record was written: the next power-up shows whether \
-                 the old or the new settings are kept",
-            ),
-            Power::On(encoder) if encoder.is_saving() => None,
-            Power::On(encoder) if encoder.snapshot(now).saved == *block => Some(Ok(())),
-            Power::On(_) => failed("the memory did not take the record: save once more"),
-        }
-    }
-
-    /// Which kinds of faults it has now, power and bus apart.
-    pub(crate) fn faults(&self, faults: &mut Vec<&'static str>) {
-        let sensor = self.sensor();
-        if sensor.shaft().is_some_and(Faulty::is_cell_low) {
-            faults.push("cell-low");
-        }
-        if sensor.shaft().is_some_and(Faulty::is_stuck) {
-            faults.push("stuck");
-        }
-        let drops = match &self.power {
-            Power::On(encoder) => encoder.drops(),
-            Power::Off(_) => self.drops,
-        };
-        if drops.is_some_and(|drops| drops.count != Some(0)) {
-            faults.push("drop-answers");
-        }
-        if self.delay > Duration::ZERO {
-            faults.push("late-answers");
-        }
-        faults.extend(sensor.line_fault().map(kind_of));
     }
 
     /// Writes a memory file in a thread of its own from now on.
@@ -359,6 +299,7 @@ impl<B: FieldBus> Device<B> {
         if let Some(at) = restarted
             && self.switches_in_force != self.switches
         {
+            self.has_moved = true;
             self.wake(at);
         }
     }
@@ -483,6 +424,21 @@ mod tests {
         device.handle(at, Input::Frame(&parse_frame("42C#8A810000").unwrap()));
         while device.transmit(at).is_some() {}
         device
+    }
+
+    /// AMG manual §9.1: the switches are read at power-up, and a reset is one.
+    #[test]
+    fn a_reset_over_the_bus_reads_the_switches_and_has_the_device_plugged_in_anew() {
+        let mut device = set_up(1);
+        device.take_reports();
+        let positions = SwitchPositions { rotary: [0, 9], ..device.switches().clone() };
+        device.set_switches(positions);
+        assert_eq!(device.switches_at_power_up().rotary, [0, 5]);
+        assert!(!device.has_moved());
+        let at = micros(2_110_000);
+        assert_eq!(hear(&mut device, at, "42C#0A050101").as_deref(), Some("42B#0A85"));
+        assert_eq!(device.switches_at_power_up().rotary, [0, 9]);
+        assert!(device.has_moved() && device.label().ends_with("at 9"));
     }
 
     #[test]

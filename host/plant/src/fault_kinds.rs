@@ -271,6 +271,20 @@ mod tests {
         }
     }
 
+    /// The schema of plant files is made of all kinds that there are.
+    #[test]
+    fn every_kind_of_plant_files_begins_or_ends_a_fault_here() {
+        let schema: serde_json::Value = serde_json::from_str(&crate::schema()).unwrap();
+        let kinds = schema["$defs"]["FaultKind"]["oneOf"].as_array().unwrap();
+        let ends = ["cell-right", "free", "ssi-right"];
+        let mut kinds: Vec<_> = kinds.iter().map(|kind| kind["const"].as_str().unwrap()).collect();
+        kinds.retain(|kind| !ends.contains(kind));
+        let mut named: Vec<_> = names().collect();
+        kinds.sort_unstable();
+        named.sort_unstable();
+        assert_eq!(named, kinds);
+    }
+
     #[test]
     fn a_product_is_offered_the_faults_that_it_can_have() {
         let names = |model: &str, simulated| {

@@ -98,6 +98,9 @@ pub trait FieldBus: Copy + fmt::Debug + PartialEq + Send + Sized + 'static {
     /// and nobody hears it.
     fn rate_apart(switches: &Self::Switches, rate: Self::Rate) -> Option<Self::Rate>;
 
+    /// Why the settings of a device cannot be written, where a master of this plant serves it or not.
+    fn settings_fixed(is_served: bool) -> Option<&'static str>;
+
     /// What can be read of a device and set, while it has power; its master, where one of this plant
     /// serves it at an address.
     fn objects(

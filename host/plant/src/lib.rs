@@ -12,7 +12,6 @@ mod complaint;
 mod crew;
 mod description;
 mod device;
-mod device_state;
 mod devicenet;
 mod ears;
 mod fault;

@@ -4,7 +4,7 @@ use codewheel_link::Waker;
 use codewheel_station::Instant;
 
 use crate::device::Device;
-use crate::field_bus::{FieldBus, PlannedMaster};
+use crate::field_bus::{FieldBus, PlannedMaster, Switches};
 use crate::keeper::Keeper;
 use crate::report::What;
 use crate::{BusDescription, BusPlan, MasterDescription, StartError};
@@ -44,17 +44,17 @@ impl<B: FieldBus> Manned<B> {
             name: master.name().to_owned(),
             address: master.address(),
         });
+        let devices = plan.devices.iter().zip(&self.devices).map(|(planned, device)| {
+            let address = planned.switches.address();
+            let serves = |master: &B::MasterPlan| address.is_some_and(|at| master.serves(at));
+            device.describe(planned, plan.masters.iter().any(serves))
+        });
         BusDescription {
             name: plan.name.clone(),
             bus: B::BUS,
             uri: plan.uri.to_string(),
             bit_rate: plan.bit_rate.to_string(),
-            devices: plan
-                .devices
-                .iter()
-                .zip(&self.devices)
-                .map(|(plan, device)| device.describe(plan))
-                .collect(),
+            devices: devices.collect(),
             masters: masters.collect(),
         }
     }

@@ -90,6 +90,7 @@ impl<B: FieldBus> VirtualBus<B> {
             self.crew.pull_levers(at, &mut self.segment);
         }
         self.segment.wire.run_until(until, observer);
+        self.crew.follow_switches(&mut self.segment);
     }
 
     /// Averages rates and load over so long a time at least, however often snapshots are made.
@@ -128,6 +129,11 @@ impl<B: FieldBus> VirtualBus<B> {
     /// [`Refusal`] where there is no such device.
     pub fn objects(&self, device: &str) -> Result<Vec<ObjectGroup>, Refusal> {
         self.crew.objects(device, &self.segment)
+    }
+
+    /// Its time.
+    pub(crate) fn now(&self) -> Instant {
+        self.segment.wire.now()
     }
 
     /// What has been counted on the wire.

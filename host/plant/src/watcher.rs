@@ -99,14 +99,14 @@ impl Board {
         self.period.store(shortest.unwrap_or(u64::MAX), Ordering::Relaxed);
     }
 
-    /// Leaves the newest snapshot of the bus at `place`; `last` where there will be no other.
-    pub(crate) fn leave(&self, place: usize, snapshot: &BusSnapshot, last: bool) {
+    /// Leaves the newest snapshot of the bus at `place`, which was made `now`; `last` where there will be no other.
+    pub(crate) fn leave(&self, place: usize, now: Instant, snapshot: &BusSnapshot, last: bool) {
         let mut notes = self.lock();
         for desk in notes.watchers.values_mut() {
             let period = desk.period;
             let Some(tray) = desk.trays.get_mut(place) else { continue };
-            if last || snapshot.at >= tray.next {
-                tray.next = snapshot.at + period;
+            if last || now >= tray.next {
+                tray.next = now + period;
                 tray.put(snapshot.clone());
             } else {
                 tray.untold.note(snapshot);

@@ -80,6 +80,11 @@ impl FieldBus for DeviceNet {
         Some(switches.bit_rate()).filter(|switched| *switched != rate)
     }
 
+    /// They are the device's own.
+    fn settings_fixed(_: bool) -> Option<&'static str> {
+        None
+    }
+
     fn objects(
         outfit: &Outfit<Self>,
         encoder: Option<&Self::Encoder>,

@@ -89,6 +89,10 @@ impl FieldBus for Profibus {
         None
     }
 
+    fn settings_fixed(is_served: bool) -> Option<&'static str> {
+        (!is_served).then_some(objects::NOT_SERVED)
+    }
+
     fn objects(
         outfit: &Outfit<Self>,
         encoder: Option<&Self::Encoder>,

@@ -14,6 +14,10 @@ use super::Profibus;
 use crate::field_bus::Outfit;
 use crate::{Object, ObjectGroup, Value};
 
+/// Why settings cannot be written here.
+pub(super) const NOT_SERVED: &str =
+    "it belongs to the master, and no master of this plant serves the device";
+
 /// The objects of a device; `told` are the user octets of Set_Prm that a master of this plant gives it.
 pub(super) fn objects<S: Sensor>(
     outfit: &Outfit<Profibus>,
@@ -51,9 +55,7 @@ fn parameter<S: Sensor>(
         help: row.help,
         note: row.note,
         setting: true,
-        why_not: told.is_none().then(|| {
-            "it belongs to the master, and no master of this plant serves the device".to_owned()
-        }),
+        why_not: told.is_none().then(|| NOT_SERVED.to_owned()),
         range: Some((minimum.into(), maximum.into())),
         values: row.values,
         value: in_force.or(sent).map(|value| Value::Number(value.into())),

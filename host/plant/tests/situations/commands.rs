@@ -521,3 +521,21 @@ fn an_unknown_device_is_named_with_those_that_there_are() {
     assert_eq!(refusal.cause, Cause::Unknown);
     assert!(refusal.text.contains("there is drive"), "{refusal}");
 }
+
+#[test]
+fn a_master_finds_a_device_at_the_address_that_it_was_moved_to() {
+    let text = "[[bus]]\nname = \"b\"\nuri = \"virtual:b\"\nbaud = \"500k\"\n\
+                [[device]]\nname = \"drive\"\nmodel = \"amg11-d29\"\naddress = 5\n\
+                [[master]]\naddress = 0\ninterval = \"10ms\"\nslave = [{ address = 9 }]\n";
+    let mut bus = VirtualBus::power_up(only_bus(plant(text))).unwrap();
+    let mut moment = 3_000;
+    let switch = Switch { rotary: Some([0, 9]), ..Switch::default() };
+    order(&mut bus, &mut moment, &Command::Switch(switch)).unwrap();
+    assert_eq!(device(&at(&mut bus, 4_000), "drive").address, 5);
+    order(&mut bus, &mut moment, &Command::Power(false)).unwrap();
+    order(&mut bus, &mut moment, &Command::Power(true)).unwrap();
+    let snapshot = at(&mut bus, 9_000);
+    let drive = device(&snapshot, "drive");
+    assert_eq!((drive.address, drive.state.connection, drive.state.master), (9, "polled", Some(0)));
+    assert_eq!(drive.served_by.as_deref(), Some("scanner at 0"));
+}

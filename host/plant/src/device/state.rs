@@ -8,7 +8,7 @@ use codewheel_encoder::{Block, Direction};
 use codewheel_profibus as profibus;
 use codewheel_station::Instant;
 
-use crate::device::Device;
+use super::Device;
 use crate::field_bus::FieldBus;
 use crate::snapshot::{
     DeviceState, LampState, Measured, Memory, ShaftState, SlaveSnapshot, SlaveState,
