@@ -36,20 +36,19 @@ SIZE = {"width": 1280, "height": 800}
 def make_small(path: Path) -> None:
     """Leaves a picture as many colours as a flat page needs, which is a third of the octets."""
     with Image.open(path) as picture:
-        small = picture.convert("RGB").quantize(
-            160, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
-        )
+        small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
     small.save(path, optimize=True)
 
 
-def into_the_middle(page: Page) -> None:
-    """Presets an encoder that swings around 0 so that its curve does not wrap."""
-    shown = page.locator(".position-own .huge .number").inner_text()
-    position = int(re.sub(r"\s", "", shown))
+def swing_in_the_middle(page: Page) -> None:
+    """Lets an encoder swing around the middle of its range, so that its curve does not wrap."""
+    page.get_by_role("button", name="Rest", exact=True).click()
+    page.locator(".measured .reading", has_text=re.compile(r"Speed\s*0\.0")).wait_for()
     field = page.get_by_label("The position here becomes")
-    field.fill(str((position + STEPS // 2) % STEPS))
+    field.fill(str(STEPS // 2))
     field.press("Enter")
-    field.blur()
+    page.get_by_text("Not saved", exact=False).wait_for()
+    page.get_by_role("button", name="Swing", exact=True).click()
 
 
 def main() -> int:
@@ -72,11 +71,13 @@ def main() -> int:
             encoder.locator(".card h3 a").nth(1).click()
             encoder.wait_for_selector(".object-table")
             pages += [(f"page-overview-{scheme}", overview), (f"page-encoder-{scheme}", encoder)]
-        into_the_middle(pages[1][1])
+        swing_in_the_middle(pages[1][1])
         time.sleep(arguments.seconds)
         for name, page in pages:
             path = IMAGES / f"{name}.png"
             page.bring_to_front()
+            page.mouse.move(0, 0)
+            page.evaluate("scrollTo(0, 0)")
             page.screenshot(path=path)
             make_small(path)
             print(f"{path.relative_to(ROOT)}: {path.stat().st_size} octets")
