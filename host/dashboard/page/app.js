@@ -79,7 +79,10 @@ function show(plant) {
     overview.take(detail);
     if (view !== overview) view.take(detail);
   });
-  live.addEventListener("link", () => showLink(live));
+  live.addEventListener("link", () => {
+    if (live.link === "live") reloadIfAnother(plant);
+    showLink(live);
+  });
   addEventListener("hashchange", route);
   route();
 
@@ -90,6 +93,17 @@ function show(plant) {
     requestAnimationFrame(picture);
   };
   requestAnimationFrame(picture);
+}
+
+/** What answers again after a while may be another plant, or the same one with other devices. */
+async function reloadIfAnother(plant) {
+  try {
+    const now = await fetchPlant();
+    if (JSON.stringify(now) !== JSON.stringify(plant)) location.reload();
+  } catch (error) {
+    // The link tells by itself that it is lost again.
+    if (!(error instanceof Refusal)) throw error;
+  }
 }
 
 function showLink(live) {

@@ -15,7 +15,7 @@ export function createDevicePanel(context) {
   const outcome = new Outcome();
   const lamp = createLamp();
   const state = reading("State");
-  const network = reading("Network");
+  const master = reading("Master");
   const address = reading("Address");
   const serial = reading("Serial number");
   const health = element("p", { class: "health" });
@@ -40,7 +40,7 @@ export function createDevicePanel(context) {
       element("div", { class: "lamp-large" }, lamp.root), health,
       element("div", { class: "power-row" }, power, cycle)),
     outcome.root,
-    element("dl", { class: "readings" }, address.root, state.root, network.root, serial.root),
+    element("dl", { class: "readings" }, address.root, state.root, master.root, serial.root),
     switches.root,
   );
   setText(serial.value, device.serial ?? NOTHING);
@@ -52,18 +52,13 @@ export function createDevicePanel(context) {
       setAttribute(power, "aria-pressed", String(on));
       setText(power, on ? "Power is on" : "Power is off");
       setText(state.value, on ? now.state ?? NOTHING : "no power");
-      setText(network.value, on ? networkText(now.network) : NOTHING);
+      setText(master.value, on ? now.network?.master ?? "none" : NOTHING);
       setText(address.value, now?.address ?? NOTHING);
       setText(health, healthOf(now, on));
       setAttribute(health, "data-standing", on && now.alarm ? "alarm" : on && now.warning ? "warning" : null);
       switches.update(now?.switches, on);
     },
   };
-}
-
-function networkText(network) {
-  if (!network) return NOTHING;
-  return network.master == null ? network.state : `${network.state}, master ${network.master}`;
 }
 
 function healthOf(now, on) {

@@ -12,11 +12,15 @@ const COAST = 120;
  * Where the shaft stands and where position 0 lies, as shares of a turn clockwise.
  * @param {object} device as the state tells it
  * @param {{steps: number}} fixed as the plant tells it
- * @returns {{shaft: number|null, zero: number|null, speed: number}} `speed` in rpm, clockwise
+ * @returns {{shaft: number|null, zero: number|null, speed: number}} `speed` in rpm, clockwise;
+ *   `null` where nobody knows, `zero` without power too
  */
 export function angles(device, { steps }) {
   if (!device?.power || typeof device.angle !== "number") {
-    return { shaft: null, zero: null, speed: 0 };
+    // A shaft turns without power too; only nobody measures it.
+    const code = device?.shaft?.code;
+    const known = typeof code === "number" && steps > 0;
+    return { shaft: known ? modulo(code / steps, 1) : null, zero: null, speed: 0 };
   }
   const clockwise = device.direction === "CCW" ? -1 : 1;
   const speed = (device.rpm ?? 0) * clockwise;
@@ -33,7 +37,7 @@ export function angles(device, { steps }) {
 
 /** A small dial for the overview: needle, marks and where position 0 lies. */
 export function createSmallDial() {
-  const needle = svg("g", { class: "needle" }, svg("path", { d: "M-3 10 L0-36 L3 10Z" }));
+  const needle = svg("g", { class: "needle" }, svg("path", { d: "M-3.4 0 L-0.8-40 L0.8-40 L3.4 0 L2 15 L-2 15Z" }));
   const zero = svg("path", { class: "zero", d: "M-5-47 L5-47 L0-39Z" });
   const face = svg("circle", { class: "face", r: 46 });
   const marks = svg("path", { class: "marks", d: ticks(12, 41, 45) });
@@ -46,10 +50,9 @@ export function createSmallDial() {
     root,
     update(device, fixed) {
       const { shaft, zero: mark } = angles(device, fixed);
-      setAttribute(root, "data-off", shaft === null);
-      if (shaft === null) return;
-      needle.setAttribute("transform", `rotate(${(shaft * 360).toFixed(1)})`);
-      setAttribute(zero, "transform", `rotate(${(mark * 360).toFixed(1)})`);
+      setAttribute(root, "data-off", mark === null);
+      setAttribute(needle, "transform", `rotate(${((shaft ?? 0) * 360).toFixed(1)})`);
+      if (mark !== null) setAttribute(zero, "transform", `rotate(${(mark * 360).toFixed(1)})`);
     },
   };
 }
@@ -70,12 +73,12 @@ export function createLargeDial(shaft) {
   const zero = svg(
     "g", { class: "zero" },
     svg("path", { d: "M-6-118 L6-118 L0-107Z" }),
-    svg("text", { y: -120.5 }, "0"),
+    svg("text", { y: -124.5 }, "0"),
   );
   const arrow = svg("path", { class: "arrow", d: "M-21-12 A24 24 0 0 1 21-12 M21-12 l-8-1.6 M21-12 l1.6-8" });
   const root = svg(
     "svg",
-    { class: "dial large", viewBox: "-132 -132 264 264", "aria-hidden": "true" },
+    { class: "dial large", viewBox: "-131 -131 262 262", "aria-hidden": "true" },
     svg("circle", { class: "bezel", r: 106 }),
     svg("circle", { class: "face", r: 104 }),
     svg("path", { class: "marks fine", d: ticks(180, 101, 104) }),
@@ -94,7 +97,7 @@ export function createLargeDial(shaft) {
       const next = angles(device, fixed);
       if (next.shaft !== last.shaft) since = performance.now();
       last = next;
-      setAttribute(root, "data-off", next.shaft === null);
+      setAttribute(root, "data-off", next.zero === null);
       setAttribute(root, "data-direction", device?.direction ?? "CW");
       if (next.zero !== null) setAttribute(zero, "transform", `rotate(${(next.zero * 360).toFixed(2)})`);
       const blur = Math.abs(next.speed) > BLUR_RPM;

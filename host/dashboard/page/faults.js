@@ -4,6 +4,9 @@ import { element, freshId, setAttribute, setText } from "./dom.js";
 import { button, Outcome, panel } from "./panel.js";
 import { parseWhole } from "./units.js";
 
+/** What stands in a field that must be filled. */
+const EXAMPLES = { integer: "4000", probability: "0.5", time: "20ms" };
+
 /** The panel of faults. */
 export function createFaults({ device, locked, send }) {
   const { root, body } = panel("Faults to provoke", "faults");
@@ -64,7 +67,7 @@ function createField({ name, type, required, default: usual, help }, disabled) {
   const id = freshId("fault");
   const input = element("input", {
     id, type: "text", size: 9, autocomplete: "off", disabled, required, title: help,
-    placeholder: usual ?? (type === "integer" ? "4000" : ""),
+    placeholder: usual ?? (required ? EXAMPLES[type] : null),
   });
   return {
     name,
@@ -77,11 +80,9 @@ function createField({ name, type, required, default: usual, help }, disabled) {
         const value = parseWhole(text);
         return value === null ? { wrong: `${name} is a whole number, not "${text}".` } : { value };
       }
-      if (type === "number") {
-        const value = Number(text);
-        return Number.isFinite(value) ? { value } : { wrong: `${name} is a number, not "${text}".` };
-      }
-      return { value: text };
+      if (type === "time") return { value: text };
+      const value = Number(text);
+      return Number.isFinite(value) ? { value } : { wrong: `${name} is a number, not "${text}".` };
     },
   };
 }

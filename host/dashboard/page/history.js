@@ -1,7 +1,7 @@
 /** @file The last minute of every encoder, kept while the page is open. */
 
 const SPAN = 60;
-/** Samples closer together replace each other; seconds. */
+/** A sample that came so soon after the one before gives its place to the next; seconds. */
 const CLOSEST = 0.1;
 const ROOM = 640;
 
@@ -19,8 +19,10 @@ export class History {
   /** Takes what the state tells at `at`, in seconds from the start of the plant. */
   push(at, device) {
     const before = (this.#end + ROOM - 1) % ROOM;
+    // A time that goes back is that of another run of the plant.
+    if (this.#length > 0 && at < this.#times[before]) this.#length = 0;
     const earlier = (this.#end + ROOM - 2) % ROOM;
-    const close = this.#length > 1 && at - this.#times[earlier] < CLOSEST;
+    const close = this.#length > 1 && this.#times[before] - this.#times[earlier] < CLOSEST;
     const place = close ? before : this.#end;
     if (!close) {
       this.#end = (this.#end + 1) % ROOM;

@@ -15,7 +15,8 @@ export function createMeasured({ device, live }, history) {
   const angle = reading("Angle");
   const turns = reading("Turn");
   const rpm = reading("Speed", "rpm");
-  const velocity = reading("Speed", "steps/s");
+  const velocity = element("dd", { class: "fine" }, NOTHING);
+  rpm.root.append(velocity);
   const code = reading("Raw code");
   const range = element("span", { class: "range-bar", "aria-hidden": "true" }, element("span"));
   const share = element("span", {}, NOTHING);
@@ -31,7 +32,7 @@ export function createMeasured({ device, live }, history) {
         element("h3", {}, "At the master"),
         element("p", { class: "huge" }, polled),
         asked)),
-    element("dl", { class: "readings" }, angle.root, turns.root, rpm.root, velocity.root, code.root),
+    element("dl", { class: "readings" }, angle.root, turns.root, rpm.root, code.root),
     element("div", { class: "range" }, range,
       element("p", { class: "fine" }, share, " of the measuring range of ", total, " steps")),
     trend.root,
@@ -46,11 +47,11 @@ export function createMeasured({ device, live }, history) {
       const of = device.turns > 1 ? ` / ${whole(rangeTurns(on) ?? device.turns)}` : "";
       setText(turns.value, on ? `${whole(on.turns)}${of}` : NOTHING);
       setText(rpm.value, fixed(on?.rpm, 1));
-      setText(velocity.value, whole(on?.velocity));
+      setText(velocity, `${whole(on?.velocity)} steps/s`);
       setText(code.value, whole(on?.code));
       const part = on?.total_resolution > 0 ? on.position / on.total_resolution : 0;
       range.firstChild.style.transform = `scaleX(${part.toFixed(4)})`;
-      setText(share, on ? percent(part, 1) : NOTHING);
+      setText(share, on ? percent(part, 2) : NOTHING);
       setText(total, whole(on?.total_resolution));
       const master = state?.master;
       setText(polled, whole(master?.position));

@@ -2,7 +2,7 @@
 
 import { element, freshId, setAttribute, setText } from "./dom.js";
 import { button, Outcome, panel, reading } from "./panel.js";
-import { parseWhole, whole, NOTHING } from "./units.js";
+import { NOTHING, parseWhole, splitWords, whole } from "./units.js";
 
 /** The panel of preset and memory. */
 export function createMemory({ device, locked, send }) {
@@ -19,8 +19,9 @@ export function createMemory({ device, locked, send }) {
   const preset = (event) => {
     event.preventDefault();
     const number = parseWhole(value.value);
-    if (number === null) {
-      outcome.tell(`"${value.value}" is no whole number: write one as 4096 or 1000h.`, true);
+    if (number === null || number < 0 || splitWords(number) === null) {
+      const wanted = "write one of 32 bits, as 4096 or 1000h";
+      outcome.tell(`"${value.value}" is no position: ${wanted}.`, true);
       return;
     }
     outcome.of(send("POST", "preset", { value: number }));
@@ -59,5 +60,5 @@ export function createMemory({ device, locked, send }) {
 
 function why(locked, device) {
   if (locked) return locked;
-  return device.editable ? null : "A master of another plant sets this encoder: change it there.";
+  return device.editable ? null : device.why_not_editable ?? "It cannot be set here.";
 }

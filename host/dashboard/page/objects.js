@@ -85,13 +85,14 @@ export function createObjects({ place, device, live, locked, send }) {
 function createGroup({ title, objects }, rows, context) {
   const head = ["Number", "Name", "Value", "Saved", ""].map((name) =>
     name ? element("th", { scope: "col" }, name) : element("th", { scope: "col" }, element("span", { class: "unseen" }, "Change")));
+  const keeps = objects.some((object) => object.saved != null);
   const body = element("tbody");
   for (const object of objects) {
     const row = createRow(object, context);
     rows.set(object.key, row);
     body.append(...row.lines);
   }
-  const root = element("table", { class: "object-table" },
+  const root = element("table", { class: keeps ? "object-table" : "object-table unkept" },
     element("caption", {}, title), element("thead", {}, element("tr", {}, ...head)), body);
   return { root, keys: objects.map((object) => object.key) };
 }
@@ -102,7 +103,7 @@ function createRow(first, { locked, send }) {
   const value = element("span", { class: "number" });
   const saved = element("span", { class: "number" });
   const name = element("span", { class: "object-name" }, object.title);
-  const help = [object.help, object.note].filter(Boolean).join(" ");
+  const help = [object.help, object.note].filter(Boolean).map(sentence).join(" ");
   const change = element("button", { type: "button", class: "quiet", "aria-expanded": "false", onclick: () => toggle() }, "Change");
   const outcome = new Outcome();
   const editorSeat = element("td", { colspan: 5 }, outcome.root);
@@ -219,6 +220,10 @@ function createEditor(object, { close, write }) {
   };
 }
 
+function sentence(text) {
+  return text.endsWith(".") ? text : `${text}.`;
+}
+
 function choices(object) {
   return object.values.map((name, number) => {
     const value = typeof object.value === "number" ? number : name;
@@ -231,5 +236,5 @@ function shown(object, value) {
   if (typeof value !== "number") return String(value);
   const named = object.values?.[value];
   if (named) return named;
-  return object.unit ? `${whole(value)} ${object.unit}` : whole(value);
+  return object.unit ? `${whole(value)}\u00a0${object.unit}` : whole(value);
 }

@@ -9,6 +9,9 @@ import { createReports } from "./reports.js";
 import { linkTo } from "./routes.js";
 import { degrees, fixed, milliseconds, NOTHING, percent, whole } from "./units.js";
 
+/** More encoders than these get small cards. */
+const MANY = 24;
+
 /**
  * The overview of the plant. It stays in the document while an encoder is shown.
  * @param {object} plant what does not change
@@ -16,13 +19,14 @@ import { degrees, fixed, milliseconds, NOTHING, percent, whole } from "./units.j
  */
 export function createOverview(plant, live) {
   const cards = new Map();
+  const encoders = plant.buses.reduce((sum, bus) => sum + bus.devices.length, 0);
   const heads = plant.buses.map((bus) => createBus(bus, plant.read_only, cards));
   const counts = element("p", { class: "counts" });
   const find = createFilter((words, troubled) => show(cards, words, troubled));
   const reports = createReports(live, { title: "Events" });
   const heading = element("h1", { tabindex: -1 }, "Encoders");
   const root = element(
-    "div", { class: "overview" },
+    "div", { class: encoders > MANY ? "overview many" : "overview" },
     element("div", { class: "overview-head" }, heading, counts, find.root),
     ...heads.map((bus) => bus.root),
     reports.root,
@@ -89,7 +93,7 @@ function createFilter(apply) {
 function show(cards, words, troubled) {
   for (const card of cards.values()) {
     const found = words.every((word) => card.words.includes(word));
-    setAttribute(card.root, "hidden", !found || (troubled && card.standing === "good"));
+    setAttribute(card.root, "hidden", !found || (troubled && FINE.includes(card.standing)));
   }
 }
 
@@ -137,7 +141,7 @@ function fact(name, value) {
 function createMaster({ id, address }) {
   const text = element("span", { class: "number" }, NOTHING);
   return {
-    root: fact(`${id} (${address})`, text),
+    root: fact(id.endsWith(` ${address}`) ? id : `${id} (${address})`, text),
     update(now) {
       if (!now) setText(text, NOTHING);
       else if (!now.on_line) setText(text, "off-line");
@@ -148,13 +152,18 @@ function createMaster({ id, address }) {
 
 /** How an encoder stands, in the order in which it matters. */
 function standing(device) {
-  if (!device?.power) return "off";
+  if (!device) return "unknown";
+  if (!device.power) return "off";
   if (device.alarm) return "alarm";
   if (device.warning) return "warning";
   return device.faults?.length ? "fault" : "good";
 }
 
-const STANDINGS = { off: "no power", alarm: "alarm", warning: "warning", fault: "fault provoked", good: "" };
+/** What the badge of a card says. */
+const STANDINGS = {
+  unknown: "", off: "no power", alarm: "alarm", warning: "warning", fault: "fault provoked", good: "",
+};
+const FINE = ["good", "unknown"];
 
 function createCard(place, fixed_, readOnly) {
   const dial = createSmallDial();
@@ -183,7 +192,7 @@ function createCard(place, fixed_, readOnly) {
     power.outcome.root,
   );
   const card = {
-    root, place, standing: "off",
+    root, place, standing: "unknown",
     words: `${place.bus} ${fixed_.id} ${fixed_.model} ${fixed_.title}`.toLowerCase(),
     update(device) {
       dial.update(device, fixed_);
@@ -194,12 +203,12 @@ function createCard(place, fixed_, readOnly) {
       setText(turns, on ? whole(device.turns) : NOTHING);
       setText(speed, on ? fixed(device.rpm, 1) : NOTHING);
       setText(address, device?.address ?? NOTHING);
-      setText(state, on ? device.state ?? NOTHING : "no power");
+      setText(state, on ? device.state ?? NOTHING : device ? "no power" : NOTHING);
       setText(master, masterText(device?.master));
       card.standing = standing(device);
       setAttribute(root, "data-standing", card.standing);
       setText(alarm, STANDINGS[card.standing]);
-      power.update(Boolean(on));
+      power.update(device ? Boolean(on) : null);
     },
   };
   return card;
@@ -213,13 +222,13 @@ function masterText(master) {
 
 function createPower(place, name, readOnly) {
   const outcome = new Outcome();
-  let on = false;
+  let on = null;
+  const word = element("span", {}, NOTHING);
   const root = element(
     "button",
-    { type: "button", class: "power", "aria-pressed": "false", "aria-label": `Power of ${name}`,
-      title: readOnly ? "The page is read-only." : "Power", disabled: readOnly,
-      onclick: () => send() },
-    "off",
+    { type: "button", class: "power", "aria-pressed": "false", disabled: true,
+      title: readOnly ? "The page is read-only." : "Power", onclick: () => send() },
+    element("span", { class: "unseen" }, `Power of ${name} `), word,
   );
   async function send() {
     try {
@@ -235,8 +244,9 @@ function createPower(place, name, readOnly) {
     outcome,
     update(now) {
       on = now;
-      setAttribute(root, "aria-pressed", String(on));
-      setText(root, on ? "on" : "off");
+      setAttribute(root, "aria-pressed", String(Boolean(on)));
+      setAttribute(root, "disabled", readOnly || on === null);
+      setText(word, on === null ? NOTHING : on ? "on" : "off");
     },
   };
 }

@@ -19,7 +19,7 @@ const CHOICES = [
 export function createShaft({ device, locked, send }) {
   const dial = createLargeDial(device.shaft);
   const outcome = new Outcome();
-  const why = locked ?? (device.can_turn ? null : "This shaft is real: it cannot be turned from here.");
+  const why = locked ?? (device.can_turn ? null : device.why_not_turned ?? "It cannot be turned here.");
   const post = (body) => outcome.of(send("POST", "shaft", body));
   const quietly = async (body) => {
     try {

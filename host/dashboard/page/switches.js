@@ -17,15 +17,18 @@ export function createSwitches({ device, locked, send }) {
   const rotary = device.switches.rotary.map((fixed, place) =>
     createRotary(fixed, disabled, (digit) => put({ rotary: set.rotary.with(place, digit) })));
   const dip = device.switches.dip.map((fixed, place) =>
-    createDip(`DIP ${fixed.label}`, fixed.meaning, disabled, (on) => put({ dip: set.dip.with(place, on) })));
+    createDip(`DIP ${fixed.label}`, fixed.meaning?.split(":")[0], disabled, (on) => put({ dip: set.dip.with(place, on) })));
   const termination = createDip("Termination", "terminating resistor", disabled, (on) =>
     put({ termination: on }));
+  // "bit rate: 2 and 3 OFF OFF 125k, …" stands once for both switches, its first words at each.
+  const legend = new Set(device.switches.dip.map((fixed) => fixed.meaning).filter((text) => text?.includes(":")));
   const pending = element("p", { class: "pending" });
   const root = element(
     "div", { class: "switches" },
     element("h3", {}, "Switches"),
     element("div", { class: "rotaries" }, ...rotary.map((one) => one.root)),
     element("div", { class: "dips" }, ...dip.map((one) => one.root), termination.root),
+    ...[...legend].map((text) => element("p", { class: "hint" }, text)),
     pending, outcome.root,
   );
   return {
@@ -38,17 +41,29 @@ export function createSwitches({ device, locked, send }) {
       rotary.forEach((one, place) => one.update(set.rotary[place] ?? 0));
       dip.forEach((one, place) => one.update(Boolean(set.dip[place])));
       termination.update(set.termination);
-      const waits = on && String(switches.now) !== String(switches.at_power_up);
-      const inForce = (switches.at_power_up ?? []).join("");
-      setText(pending, waits
-        ? `Pending: ${set.rotary.join("")} acts at the next power-up; ${inForce} is in force.`
-        : "The device reads its switches at power-up.");
-      setAttribute(pending, "data-waits", waits);
+      const waits = on ? waiting(switches) : [];
+      setText(pending, waits.length
+        ? `Acts at the next power-up: ${waits.join("; ")}.`
+        : "The device reads its switches at power-up; the terminating resistor acts at once.");
+      setAttribute(pending, "data-waits", waits.length > 0);
     },
   };
 }
 
-function createRotary({ label, digits }, disabled, turn) {
+/** What has been turned since the power-up, in words. */
+function waiting({ now, at_power_up, dip, dip_at_power_up }) {
+  const waits = [];
+  if (at_power_up && String(now) !== String(at_power_up)) {
+    waits.push(`address switches ${now.join("")}, in force ${at_power_up.join("")}`);
+  }
+  const word = (switches) => switches.map((on) => (on ? "ON" : "OFF")).join(" ");
+  if (dip_at_power_up && String(dip) !== String(dip_at_power_up)) {
+    waits.push(`DIP ${word(dip)}, in force ${word(dip_at_power_up)}`);
+  }
+  return waits;
+}
+
+function createRotary({ label, digits, meaning }, disabled, turn) {
   let now = 0;
   const pointer = svg("g", { class: "rotary-pointer" },
     svg("circle", { r: 17 }), svg("path", { d: "M-3.2 12V-6h-3.6L0-15 6.8-6H3.2V12Z" }));
@@ -63,7 +78,7 @@ function createRotary({ label, digits }, disabled, turn) {
   );
   const spin = element(
     "div",
-    { class: "rotary", role: "spinbutton", tabindex: 0, "aria-label": `Rotary switch ${label}`,
+    { class: "rotary", role: "spinbutton", tabindex: 0, "aria-label": `Rotary switch ${label}${meaning ? `, ${meaning}` : ""}`,
       "aria-valuemin": 0, "aria-valuemax": digits - 1, "aria-valuenow": 0, "aria-disabled": disabled ? "true" : null },
     picture,
   );
@@ -89,7 +104,7 @@ function createRotary({ label, digits }, disabled, turn) {
     to(inMiddle ? now + 1 : modulo(digit, digits));
   });
   const root = element("div", { class: "rotary-seat" }, spin,
-    element("span", { class: "fine", "aria-hidden": "true" }, `switch ${label}`));
+    element("span", { class: "fine", "aria-hidden": "true" }, `switch ${label}${meaning ? ` ${meaning}` : ""}`));
   return {
     root,
     update(digit) {

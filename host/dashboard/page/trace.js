@@ -14,7 +14,7 @@ const PERIOD = 100;
  * @param {string[]} words in lower case
  */
 export function matches(line, words) {
-  const text = `${line.from} ${line.to} ${line.name} ${line.text} ${line.octets}`.toLowerCase();
+  const text = [line.from, line.to, line.identifier, line.name, line.text, line.octets].join(" ").toLowerCase();
   return words.every((word) => (word.startsWith("-") && word.length > 1
     ? !text.includes(word.slice(1))
     : text.includes(word)));
@@ -120,6 +120,11 @@ function newest(lines, words, address, most) {
   return found;
 }
 
+/** As candump writes a frame; of a telegram the octets alone. */
+function octets({ identifier, octets: told }) {
+  return identifier ? `${identifier}#${told}` : told;
+}
+
 function fill(seat, rows, lines) {
   while (rows.length < lines.length) {
     const cells = Array.from({ length: 6 }, () => element("td"));
@@ -131,7 +136,7 @@ function fill(seat, rows, lines) {
     const line = lines[place];
     setAttribute(row, "hidden", !line);
     if (!line) return;
-    const texts = [clock(line.at, 3), line.from, line.to, line.name, line.text, line.octets];
+    const texts = [clock(line.at, 3), line.from, line.to, line.name, line.text, octets(line)];
     texts.forEach((text, column) => setText(cells[column], text ?? ""));
   });
 }

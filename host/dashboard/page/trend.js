@@ -9,6 +9,8 @@ const PERIOD = 100;
 /** How often the curve tells its numbers to screen readers, in ms. */
 const SPEAK = 5000;
 const [WIDTH, HEIGHT, MARGIN] = [600, 150, 6];
+/** Seconds without a sample after which a value has held; less is a stream that was late. */
+const HELD = 1;
 /** Between two dots of the master, in units of the width. */
 const DOTS = 10;
 
@@ -135,7 +137,7 @@ function lines(samples, at, round) {
   };
   for (const { at: time, value } of samples) {
     // Nothing is told while nothing changes: the value held until just before this one.
-    if (before && time - before.time > 0.3) line.push([time - 0.05, before.value]);
+    if (before && time - before.time > HELD) line.push([time - 0.05, before.value]);
     const wraps = before && round && Math.abs(value - before.value) > round / 2;
     if (Number.isNaN(value) || wraps) end();
     if (!Number.isNaN(value)) line.push([time, value]);
