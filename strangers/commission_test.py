@@ -269,8 +269,9 @@ class ProfibusSlaveGoesByTheBook(unittest.TestCase):
         self.assertGreater(second.got_from.get(2, 0), 5)
         self.assertGreater(first.got_from.get(4, 0), 5)
         line.part(second)
-        time.sleep(0.5)
-        self.assertEqual((first.lost, first.next), ([4], 2))
+        time.sleep(1.2)
+        # Either it left with the token, which had to be taken up, or it was passed to in vain.
+        self.assertEqual((len(first.lost) + first.tokens_taken_up, first.next), (1, 2))
         self.assertEqual(slave.locked_by, [2])
 
 
