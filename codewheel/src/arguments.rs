@@ -65,6 +65,8 @@ pub(crate) enum Verb {
     Doctor(DoctorArguments),
     /// Print the JSON Schema of plant files, for editors that complete and check them.
     Schema,
+    Completions(CompletionsArguments),
+    Man(ManArguments),
 }
 
 /// Run a plant: buses, devices, shafts, memories, faults and masters from one TOML file.
@@ -347,6 +349,29 @@ pub(crate) struct DoctorArguments {
     /// One JSON object a line, for each finding
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Print what makes a shell complete the verbs and options of this program.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel completions bash > ~/.local/share/bash-completion/completions/codewheel
+  codewheel completions zsh > ~/.zfunc/_codewheel
+  codewheel completions fish > ~/.config/fish/completions/codewheel.fish")]
+pub(crate) struct CompletionsArguments {
+    /// The shell
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// Print the manual page of this program, or write those of all verbs into a folder.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel man | man -l -
+  codewheel man -o ~/.local/share/man/man1")]
+pub(crate) struct ManArguments {
+    #[command(flatten)]
+    pub(crate) output: OutputArguments,
 }
 
 fn parse_model(text: &str) -> Result<&'static Product, String> {

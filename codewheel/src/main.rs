@@ -1,6 +1,7 @@
 //! `codewheel`: an absolute rotary encoder made of software.
 
 mod arguments;
+mod completions;
 mod describe;
 mod doctor;
 mod document;
@@ -8,6 +9,7 @@ mod encoder;
 mod failure;
 mod files;
 mod hilo;
+mod man;
 mod models;
 mod record;
 mod replay;
@@ -40,6 +42,8 @@ fn main() -> ExitCode {
         Some(Verb::Eds(sheet)) => sheets::run(&sheet, Bus::DeviceNet),
         Some(Verb::Gsd(sheet)) => sheets::run(&sheet, Bus::Profibus),
         Some(Verb::Hilo(numbers)) => hilo::run(&numbers),
+        Some(Verb::Completions(completions)) => completions::run(&completions),
+        Some(Verb::Man(man)) => man::run(&man),
     };
     end(result.map(|()| ExitCode::SUCCESS))
 }

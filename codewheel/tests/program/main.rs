@@ -13,5 +13,6 @@ mod record;
 mod refusals;
 mod replay;
 mod run;
+mod shell;
 #[cfg(unix)]
 mod terminal;

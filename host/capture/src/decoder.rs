@@ -8,7 +8,8 @@ mod replay;
 use self::devicenet::DeviceNet;
 use self::line::Line;
 use self::profibus::Profibus;
-use crate::{Bus, Condition, Content, Record};
+use crate::said::Listener;
+use crate::{Bus, Condition, Content, Record, Said};
 
 pub use self::replay::{Replayed, replay};
 
@@ -40,11 +41,13 @@ pub enum Assume {
 ///
 /// It remembers what answers do not repeat: the request of a response, the fragments of a message, the
 /// ident number of a slave. So it wants all records of a bus in their order.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Decoder {
     output: Output,
     assume: Assume,
     buses: Vec<State>,
+    /// A line that nobody reads, since somebody hears what it says.
+    unread: Vec<u8>,
 }
 
 #[derive(Debug, Default)]
@@ -57,18 +60,37 @@ impl Decoder {
     /// A decoder that has seen nothing yet.
     #[must_use]
     pub const fn new(output: Output, assume: Assume) -> Self {
-        Self { output, assume, buses: Vec::new() }
+        Self { output, assume, buses: Vec::new(), unread: Vec::new() }
     }
 
     /// Appends the line of `record`, which was carried by `bus`, with its end of line.
     pub fn decode(&mut self, bus: &Bus, record: &Record<'_>, out: &mut Vec<u8>) {
+        self.go_through(bus, record, out, Listener(None));
+    }
+
+    /// Tells `listener` what `record` says, for programs that want the octets and not the names. Records
+    /// that say nothing by themselves, such as a request, tell nothing.
+    pub fn hear(&mut self, bus: &Bus, record: &Record<'_>, listener: &mut dyn FnMut(Said<'_>)) {
+        let mut line = std::mem::take(&mut self.unread);
+        line.clear();
+        self.go_through(bus, record, &mut line, Listener(Some(listener)));
+        self.unread = line;
+    }
+
+    fn go_through<'o>(
+        &mut self,
+        bus: &Bus,
+        record: &Record<'_>,
+        out: &'o mut Vec<u8>,
+        listener: Listener<'o>,
+    ) {
         let place = usize::from(record.bus);
         if self.buses.len() <= place {
             self.buses.resize_with(place + 1, State::default);
         }
         let Some(state) = self.buses.get_mut(place) else { return };
         let assume = self.assume;
-        let mut line = Line::begin(out, self.output, bus, record);
+        let mut line = Line::begin(out, self.output, bus, record, listener);
         match &record.content {
             Content::Frame(frame) => {
                 let known = state.devicenet.get_or_insert_with(|| Box::new(DeviceNet::new(assume)));

@@ -3,7 +3,8 @@
 use super::Output;
 use crate::format::log::push_frame;
 use crate::hex::{push_decimal, push_octets};
-use crate::{Bus, Content, Direction, Record};
+use crate::said::Listener;
+use crate::{Bus, Content, Direction, Record, Said};
 
 /// The line that is being written.
 ///
@@ -24,6 +25,7 @@ pub(super) struct Line<'o> {
     notes: bool,
     /// The name of the next value has been said already.
     told: bool,
+    listener: Listener<'o>,
 }
 
 /// Frames are padded to this width, so that what they say stands below each other.
@@ -35,6 +37,7 @@ impl<'o> Line<'o> {
         output: Output,
         bus: &Bus,
         record: &Record<'_>,
+        listener: Listener<'o>,
     ) -> Self {
         let nanos = record.at.as_nanos();
         match output {
@@ -79,7 +82,12 @@ impl<'o> Line<'o> {
                 out.push(b'"');
             }
         }
-        Self { out, output, values: false, notes: false, told: false }
+        Self { out, output, values: false, notes: false, told: false, listener }
+    }
+
+    /// What the record says, for whoever hears it.
+    pub(super) fn said(&mut self, said: Said<'_>) {
+        self.listener.tell(said);
     }
 
     /// Who speaks to whom, where that is known.

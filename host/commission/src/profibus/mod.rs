@@ -10,6 +10,8 @@
 //! | [`MasterSettings`], [`SlaveSettings`] | what they are told, checked before profirust could panic |
 //! | [`Master::slave`] | inputs, diagnosis, where the slave stands |
 //! | [`Master::set_outputs`], [`Master::request_diagnosis`] | what the slave gets |
+//! | [`Master::serve`], [`Master::stop`] | slaves that come and go while it runs |
+//! | [`Master::ask`], [`Master::take_answer`] | what it asks of stations that it does not serve |
 //! | [`Master::take_event`] | what happened |
 //! | [`Master::cycle_times`], [`Master::counters`] | how the bus does |
 //!
@@ -34,20 +36,32 @@
 //! two seconds and three diagnoses after its Chk_Cfg is not ready is begun anew; what users set waits
 //! for the answer.
 
+mod acyclic;
 mod clock;
+mod console;
+mod conversation;
 mod event;
+mod identity;
 mod judge;
 mod line;
 mod master;
+mod overheard;
+mod scan;
 mod settings;
 mod slave;
 mod station;
 mod telegram;
+mod timeless;
 
+pub use acyclic::{Acyclic, Answer, Answered, StationKind};
+pub use console::Console;
 pub use event::{EVENTS, Event};
 pub use master::{Counters, Master, NotSet, UnknownSlave};
+pub use overheard::{HeardExchange, HeardMaster, HeardSetting, HeardSlave, Overheard};
+pub use scan::{ScanSettings, scan};
 pub use settings::{
     DATA_OCTETS, HIGHEST_ADDRESS, LONGEST_SLOT, MasterSettings, SettingsError, SlaveSettings,
-    USER_PARAMETER_OCTETS, shortest_slot,
+    USER_PARAMETER_OCTETS, patient_slot, shortest_slot,
 };
 pub use slave::{CycleTimes, Diagnosis, Service, SlaveState, SlaveView};
+pub use timeless::Timeless;

@@ -205,6 +205,8 @@ pub(super) struct Slave {
     /// Outputs or a wish for the diagnosis wait for the next request.
     pub(super) outputs_waiting: bool,
     pub(super) diagnosis_waiting: bool,
+    /// Other settings wait for the next request.
+    pub(super) renewal: Option<SlaveSettings>,
 }
 
 impl Slave {
@@ -225,8 +227,24 @@ impl Slave {
             validating: None,
             outputs_waiting: false,
             diagnosis_waiting: false,
+            renewal: None,
             settings,
         }
+    }
+
+    /// Is begun anew with other settings; what was counted stays.
+    pub(super) fn renew(&mut self, settings: SlaveSettings) {
+        if self.state != SlaveState::Absent {
+            self.state = SlaveState::Configuring;
+        }
+        *self = Self {
+            state: self.state,
+            answers: self.answers,
+            repetitions: self.repetitions,
+            losses: self.losses,
+            diagnosis: self.diagnosis.take(),
+            ..Self::new(settings, self.handle)
+        };
     }
 
     /// The peripheral that stands for it in profirust.

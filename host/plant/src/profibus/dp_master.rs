@@ -2,9 +2,11 @@
 
 use std::collections::VecDeque;
 
-use codewheel_commission::profibus::{self, Diagnosis, Event, Master, SettingsError, SlaveView};
-use codewheel_station::rs485::{BaudRate, Input, Node, TRANSMISSION_OCTETS, Transmission};
-use codewheel_station::{Instant, Station, earlier};
+use codewheel_commission::profibus::{
+    self, Diagnosis, Event, Master, SettingsError, SlaveView, Timeless,
+};
+use codewheel_station::rs485::{BaudRate, Input, Node, Transmission};
+use codewheel_station::{Instant, Station};
 
 use super::{DpMasterPlan, PresetPlan, Profibus};
 use crate::field_bus::{Seen, Talker, Told};
@@ -18,22 +20,13 @@ const SEEN: u64 = 2;
 /// What waits to be fetched of what the master tells; beyond it the oldest gives way.
 const TOLD: usize = 256;
 
-/// Octets that wait for the end of the own telegram; a peer that sends more than a few telegrams in
-/// that time does not follow the bus.
-const EARLY: usize = 4 * TRANSMISSION_OCTETS;
-
 /// A DP master with its agenda of presets.
 #[derive(Debug)]
 pub struct DpMaster {
-    master: Master,
+    master: Timeless<Master>,
     agenda: Vec<Presetting>,
     repeats: Repeats<Event>,
     told: VecDeque<Told>,
-    /// When its own telegram ends.
-    speaks_until: Instant,
-    /// What came before that: over TCP and on a pty octets take no time, so a slave may have
-    /// answered a request that by the rate of the line is still being sent.
-    early: Vec<u8>,
 }
 
 /// The presets of one slave.
@@ -76,25 +69,16 @@ impl DpMaster {
         });
         Ok(Self {
             agenda: agenda.collect(),
-            master,
+            master: Timeless::new(master),
             repeats: Repeats::new(),
             told: VecDeque::new(),
-            speaks_until: Instant::ZERO,
-            early: Vec::new(),
         })
-    }
-
-    /// Hears what came while it spoke.
-    fn catch_up(&mut self, now: Instant) {
-        if !self.early.is_empty() && self.speaks_until <= now {
-            let early = std::mem::take(&mut self.early);
-            self.master.handle(now, Input::Octets(&early));
-        }
     }
 
     /// Hears what the master has to tell, and moves the presets on.
     fn tend(&mut self, now: Instant) {
-        while let Some(event) = self.master.take_event() {
+        let master = self.master.station_mut();
+        while let Some(event) = master.take_event() {
             let text = match self.repeats.tell(now, event) {
                 None => continue,
                 Some(1) => event.to_string(),
@@ -106,7 +90,7 @@ impl DpMaster {
             self.told.push_back(Told { at: now, text, trouble: event.is_trouble() });
         }
         for presetting in &mut self.agenda {
-            presetting.tend(now, &mut self.master);
+            presetting.tend(now, master);
         }
         self.agenda.retain(|presetting| !presetting.is_done());
     }
@@ -165,35 +149,21 @@ impl Station for DpMaster {
     type Output = Transmission;
 
     fn handle(&mut self, now: Instant, input: Input<'_>) {
-        match input {
-            Input::Octets(octets) if now < self.speaks_until => {
-                let room = EARLY.saturating_sub(self.early.len()).min(octets.len());
-                self.early.extend_from_slice(&octets[..room]);
-            }
-            input => {
-                self.catch_up(now);
-                self.master.handle(now, input);
-            }
-        }
+        self.master.handle(now, input);
     }
 
     fn advance(&mut self, now: Instant) {
-        self.catch_up(now);
         self.master.advance(now);
     }
 
     fn transmit(&mut self, now: Instant) -> Option<Transmission> {
         self.tend(now);
-        let telegram = self.master.transmit(now)?;
-        let length = telegram.octets().len() as u32;
-        self.speaks_until = now + self.master.baud_rate().characters(length);
-        Some(telegram)
+        self.master.transmit(now)
     }
 
     fn deadline(&self) -> Option<Instant> {
         // A master that serves slaves is never silent for long, so presets are given in passing.
-        let early = (!self.early.is_empty()).then_some(self.speaks_until);
-        earlier(early, self.master.deadline())
+        self.master.deadline()
     }
 }
 
@@ -205,7 +175,7 @@ impl Node for DpMaster {
 
 impl Talker<Profibus> for DpMaster {
     fn slave(&self, address: u8) -> Option<Seen> {
-        let slave = self.master.slave(address)?;
+        let slave = self.master.station().slave(address)?;
         Some(Seen {
             state: match slave.state {
                 profibus::SlaveState::Absent => SlaveState::Absent,
@@ -222,11 +192,11 @@ impl Talker<Profibus> for DpMaster {
     }
 
     fn is_on_line(&self) -> bool {
-        self.master.is_in_ring()
+        self.master.station().is_in_ring()
     }
 
     fn cycle_times(&self) -> CycleTimes {
-        let profibus::CycleTimes { count, last, longest, .. } = self.master.cycle_times();
+        let profibus::CycleTimes { count, last, longest, .. } = self.master.station().cycle_times();
         CycleTimes { count, last, longest }
     }
 
