@@ -67,7 +67,7 @@ class Asked:
 class Temper:
     """How the slave misbehaves; as it comes from the box, it does not."""
 
-    # Refused with (general status, additional code), by service.
+    # Refused with (general status, additional code), by service, by the class of the device's own.
     refuse: dict[int, tuple[int, int]] = field(default_factory=dict)
     # Seconds until an explicit response leaves.
     late: float = 0.0
@@ -326,7 +326,7 @@ class Slave(Node[Frame]):
             self.is_alive = False
             return
         try:
-            if body[0] in self.temper.refuse:
+            if body[0] in self.temper.refuse and class_id == self.device.linked_class:
                 raise Refusal(*self.temper.refuse[body[0]])
             answer = bytes([body[0] | 0x80]) + self._serve(asked)
         except Refusal as refusal:
