@@ -1,11 +1,19 @@
 //! The command line.
 
+pub(crate) mod commission;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use codewheel_device::Product;
 use codewheel_link::BusUri;
 use codewheel_plant::TimeSpan;
+
+use self::commission::{
+    ApplyArguments, BackupArguments, DiffArguments, GetArguments, IdentifyArguments,
+    PassportArguments, PresetArguments, RESET_EXAMPLES, RESTORE_EXAMPLES, SAVE_EXAMPLES,
+    ScanArguments, ServiceArguments, SetArguments, WatchArguments,
+};
 
 /// An absolute rotary encoder made of software.
 ///
@@ -52,6 +60,25 @@ impl Arguments {
 pub(crate) enum Verb {
     Run(RunArguments),
     Encoder(Box<EncoderArguments>),
+    Scan(ScanArguments),
+    Identify(IdentifyArguments),
+    Get(GetArguments),
+    Set(SetArguments),
+    Preset(PresetArguments),
+    /// Keep the settings in force over a power-off (DeviceNet).
+    #[command(after_help = SAVE_EXAMPLES)]
+    Save(ServiceArguments),
+    /// Bring back the settings that were saved (DeviceNet).
+    #[command(after_help = RESTORE_EXAMPLES)]
+    Restore(ServiceArguments),
+    /// Bring back the settings of the factory; what was saved stays saved (DeviceNet).
+    #[command(after_help = RESET_EXAMPLES)]
+    Reset(ServiceArguments),
+    Watch(WatchArguments),
+    Backup(BackupArguments),
+    Diff(DiffArguments),
+    Apply(ApplyArguments),
+    Passport(PassportArguments),
     Replay(ReplayArguments),
     Models(ModelsArguments),
     Describe(DescribeArguments),

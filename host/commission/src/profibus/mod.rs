@@ -37,9 +37,12 @@
 //! for the answer.
 
 mod acyclic;
+mod chosen;
 mod clock;
 mod console;
 mod conversation;
+mod eavesdropper;
+mod encoder;
 mod event;
 mod identity;
 mod judge;
@@ -52,9 +55,12 @@ mod slave;
 mod station;
 mod telegram;
 mod timeless;
+mod values;
 
 pub use acyclic::{Acyclic, Answer, Answered, StationKind};
 pub use console::Console;
+pub use eavesdropper::Eavesdropper;
+pub use encoder::{Encoder, SessionSettings};
 pub use event::{EVENTS, Event};
 pub use master::{Counters, Master, NotSet, UnknownSlave};
 pub use overheard::{HeardExchange, HeardMaster, HeardSetting, HeardSlave, Overheard};

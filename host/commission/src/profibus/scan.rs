@@ -106,7 +106,6 @@ fn ask_all<S: Seat<Station = Console>>(
         return Err(trouble);
     }
     conversation.join(tried)?;
-    let mut all: BTreeMap<u8, Said> = BTreeMap::new();
     let own = conversation.settings.address;
     let addresses = (0..=HIGHEST_ADDRESS).filter(|address| *address != own);
     let mut open = 0;
