@@ -24,7 +24,7 @@ from pathlib import Path
 import can
 
 import devicenet_master as book
-from commission_devicenet_objects import ENCODER, VALVES, Device, Encoder, valve_terminal
+from commission_devicenet_objects import DEVICENET, VALVES, Encoder, valve_terminal
 from commission_devicenet_slave import CONNECTION, Asked, Slave
 from commission_segment import CanSegment, Visit
 from commission_walk import (
@@ -40,7 +40,7 @@ from commission_walk import (
     expect_keys,
     soon,
 )
-from devicenet_master import STATUS_NAMES, Frame, Master, Wire
+from devicenet_master import Frame, Master, Wire
 from steps import Wrong, arguments_of, expect, expect_within
 
 # Addresses on the segment.
@@ -51,11 +51,35 @@ RAW = 100_000
 LISTENING = 1.0
 # Listening, the check of the own MAC ID and what a verb says take so long at most.
 VERB_SECONDS = 12.0
+# General status codes with a word of what the CIP books call them.
+STATUSES = {
+    0x02: "resource unavailable",
+    0x05: "path",
+    0x08: "service not supported",
+    0x09: "invalid attribute value",
+    0x0B: "already in",
+    0x0C: "object state conflict",
+    0x0E: "attribute not settable",
+    0x0F: "privilege",
+    0x10: "device state conflict",
+    0x13: "not enough data",
+    0x14: "attribute not supported",
+    0x15: "too much data",
+    0x16: "object does not exist",
+    0x18: "no stored attribute data",
+    0x19: "store",
+    0x1F: "vendor",
+    0x20: "invalid parameter",
+}
 VALUE_KEYS = "name place title value label unit writable setting range"
 
 
 class Owner:
-    """Another master with a slave of its own, polling it every 50 ms until the end."""
+    """Another master with a slave of its own, polling it every 50 ms until the end.
+
+    A poll says for whom it is, not from whom; so a master that is to be known asks something else,
+    too, once in a while.
+    """
 
     def __init__(self, port: int, slave: int) -> None:
         self._bus = can.Bus(
@@ -66,6 +90,7 @@ class Owner:
         self.master.set(CONNECTION, 1, 9, b"\0\0")
         self.master.set(CONNECTION, 2, 9, b"\xf4\x01")
         self.polls = 0
+        self.asks = False
         self.trouble: list[str] = []
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -76,6 +101,8 @@ class Owner:
             try:
                 self.master.poll()
                 self.polls += 1
+                if self.asks and self.polls % 5 == 0:
+                    self.master.get(DEVICENET, 1, 1)
             except (book.BookViolation, book.Silence) as error:
                 self.trouble.append(str(error))
 
@@ -180,13 +207,23 @@ class Commission(Walk[Frame]):
         expect("its revision", valves["revision"], "2.7")
         return ", ".join(f"{mac}: {node['role']}" for mac, node in sorted(self.nodes.items()))
 
-    def names_the_owner_and_leaves_his_slave_alone(self) -> str:
-        expect("owner", self.nodes[OWNED_MAC]["owner"], OWNER_MAC)
+    def leaves_the_slave_of_another_alone(self) -> str:
+        expect("owner, who only polls", self.nodes[OWNED_MAC]["owner"], "unknown")
         expect("allocations", self.owned.allocations, [])
         expect("allocations tried", self.owned.refused_allocations, [])
         expect("explicit requests", [f"{asked}" for asked in self.owned.asked], [])
         expect("owner still", self.owned.owner, OWNER_MAC)
         return f"{self.nodes[OWNED_MAC]['state']}"
+
+    def names_an_owner_who_says_his_name(self) -> str:
+        self.owner.asks = True
+        outcome = self.verb("scan", "--json").ended(OK)
+        self.owner.asks = False
+        nodes = {each["address"]: each for each in outcome.objects if "address" in each}
+        expect("owner", nodes[OWNED_MAC]["owner"], OWNER_MAC)
+        expect("role of the owner", nodes.get(OWNER_MAC, {}).get("role"), "master")
+        expect("requests of others", {each.master for each in self.owned.asked}, {OWNER_MAC})
+        return f"{nodes[OWNER_MAC]['state']}"
 
     def releases_whom_it_asked_and_writes_nothing(self) -> str:
         free = [slave for slave in self.all if slave is not self.owned]
@@ -287,9 +324,8 @@ class Commission(Walk[Frame]):
         if not any(each.service == book.GET and each.class_id == 0x0F for each in after):
             raise Wrong(f"nothing was read back: {[str(each) for each in after]}")
         self.expect_released(self.valves)
-        for done in self.undo(outcome):
-            expect("value after undo", self.value_of(VALVES, 2), 250)
-            del done
+        self.undo(outcome)
+        expect("value after undo", self.value_of(VALVES, 2), 250)
         return f"keys {' '.join(told)}; undone"
 
     def value_of(self, class_id: int, attribute: int) -> object:
@@ -305,8 +341,6 @@ class Commission(Walk[Frame]):
         return outcome.err.strip()
 
     def tells_a_value_out_of_range(self) -> str:
-        outcome, _ = self.asked_as(self.valves, "set", "64/1/2", "0x1771:", "--yes")
-        outcome = outcome if outcome.status != USAGE else outcome
         outcome, _ = self.asked_as(self.valves, "set", "parameter/2", "6000", "--yes")
         if outcome.status not in (REFUSED, USAGE):
             raise Wrong(f"{outcome}: expected exit status 4 (or 2 where the range is known)")
@@ -339,10 +373,70 @@ class Commission(Walk[Frame]):
         expect("writes", len(self.written(self.valves)), 1)
         return f"20 octets, one acknowledge lost, {outcome.seconds:.1f} s"
 
+    def writes_once_though_the_answer_is_lost(self) -> str:
+        """Nobody can know whether it was done, so it must not be done again without a word."""
+        self.valves.temper.swallows_sets = 1
+        outcome, _ = self.asked_as(self.valves, "set", "parameter/2", "333", "--yes")
+        self.valves.temper.swallows_sets = 0
+        expect("writes", len(self.written(self.valves)), 1)
+        if outcome.status not in (OK, TIME_OUT):
+            raise Wrong(f"{outcome}: expected exit status 0 or 5")
+        soon(lambda: self.valves.is_free, "its release", 1.0)
+        self.verb("set", "parameter/2", "250", "--yes", address=VALVES_MAC).ended(OK)
+        return f"exit {outcome.status}: {outcome.err.strip().splitlines()[-1]}"
+
+    def knows_no_position_of_a_stranger(self) -> str:
+        seen = []
+        for arguments in (["preset", "5", "--yes"], ["watch", "--for", "1s"]):
+            outcome, _ = self.asked_as(self.valves, *arguments)
+            expect("writes", [str(each) for each in self.written(self.valves)], [])
+            if outcome.status not in (USAGE, REFUSED):
+                raise Wrong(f"{outcome}: expected exit status 2 or 4")
+            self.expect_released(self.valves)
+            seen.append(f"exit {outcome.status}: {outcome.err.strip().splitlines()[-1]}")
+        return "; ".join(seen)
+
+    def opens_the_adapter_at_the_rate_that_is_asked_for(self) -> str:
+        seen = {}
+        for baud, number in (("125k", "4"), ("250k", "5"), ("500k", "6")):
+            visit = self.visit()
+            self.verb("get", "--baud", baud, "--timeout", "300ms", address=NOBODY).ended(TIME_OUT)
+            expect(f"number of {baud}", [guest.rate for guest in visit.guests], [number])
+            seen[baud] = number
+        return ", ".join(f"{baud}: S{number}" for baud, number in seen.items())
+
+    def defends_its_own_address(self) -> str:
+        newcomer = Slave(OUR_MAC, valve_terminal())
+        arguments = ["watch", "--json", *self.bus, "--address", str(ENCODER_MAC)]
+        with self.running(*arguments) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            self.medium.join(newcomer)
+            soon(lambda: not newcomer.is_alive, "an objection", 1.5)
+            process.stdout.readline()
+            self.interrupt(process)
+        self.medium.part(newcomer)
+        expect("objections", [each.is_response for each in newcomer.checks], [True])
+        self.expect_released(self.encoder)
+        return "R/R = 1, and it goes on"
+
+    def takes_up_what_a_killed_one_left(self) -> str:
+        arguments = ["watch", "--json", *self.bus, "--address", str(ENCODER_MAC)]
+        with self.running(*arguments) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            process.kill()
+            process.wait()
+        outcome, _ = self.asked_as(self.encoder, "get", "position")
+        outcome.ended(OK)
+        expect("position", outcome.value, f"{RAW}")
+        soon(lambda: self.encoder.is_free, "its release", 1.0)
+        return f"position {outcome.value} after {outcome.seconds:.1f} s"
+
     # --- Trouble
 
     def tells_each_general_status(self) -> str:
-        statuses = sorted(STATUS_NAMES)
+        statuses = sorted(STATUSES)
         slaves = []
         for number, status in enumerate(statuses):
             slave = Slave(number, valve_terminal())
@@ -360,7 +454,7 @@ class Commission(Walk[Frame]):
         wrong = []
         for status, outcome in zip(statuses, outcomes, strict=True):
             try:
-                outcome.ended(REFUSED, f"{status:02X}", STATUS_NAMES[status])
+                outcome.ended(REFUSED, f"{status:02X}", STATUSES[status])
             except Wrong as error:
                 wrong.append(str(error))
         if wrong:
@@ -416,7 +510,7 @@ class Commission(Walk[Frame]):
                 self.expect_released(slave)
             if outcome.status == OK:
                 seen.append(f"format {body_format}: {outcome.value}")
-            elif outcome.status in (BUS, REFUSED):
+            elif outcome.status in (BUS, REFUSED) and "format" in outcome.err:
                 seen.append(f"format {body_format} is refused: {outcome.err.strip()}")
             else:
                 raise Wrong(f"message body format {body_format}: {outcome}")
@@ -441,8 +535,10 @@ class Commission(Walk[Frame]):
     def takes_no_slave_from_its_master(self) -> str:
         self.owned.forget()
         visit = self.visit()
+        self.owner.asks = True
         outcome = self.verb("set", "direction", "ccw", "--yes", address=OWNED_MAC)
-        outcome.ended(REFUSED, f"{OWNER_MAC}")
+        self.owner.asks = False
+        outcome.ended(REFUSED, f"MAC ID {OWNER_MAC}")
         expect("allocations tried", self.owned.refused_allocations, [])
         expect("writes", self.written(self.owned), [])
         expect("trouble of the owner", self.owner.trouble, [])
@@ -489,16 +585,27 @@ class Commission(Walk[Frame]):
         self.expect_released(self.encoder)
         return f"exit {status} after {seconds:.2f} s, releases {self.encoder.releases}"
 
-    def releases_on_ctrl_c_while_it_waits_for_an_answer(self) -> str:
-        self.valves.forget()
-        self.valves.temper.late = 3.0
-        with self.running("get", *self.bus, "--address", str(VALVES_MAC)) as process:
-            soon(lambda: bool(self.valves.asked), "a request")
+    def releases_on_ctrl_c_while_it_opens(self) -> str:
+        return self.interrupted_at(1)
+
+    def releases_on_ctrl_c_while_it_reads(self) -> str:
+        return self.interrupted_at(12)
+
+    def interrupted_at(self, request: int) -> str:
+        """Ctrl-C while an answer is awaited; the release itself needs no answer that is late."""
+        slave = self.valves
+        slave.forget()
+        slave.temper.late, slave.temper.late_from = 0.4, request
+        with self.running("get", *self.bus, "--address", str(slave.mac)) as process:
+            soon(lambda: len(slave.asked) >= request, "a request")
             status, seconds = self.interrupt(process)
-        self.valves.temper.late = 0
-        # The release needs no answer that is late.
-        soon(lambda: self.valves.is_free, "its release", 1.0)
-        expect("time-outs", self.valves.timeouts, 0)
+        slave.temper.late = 0
+        try:
+            soon(lambda: slave.is_free, "its release", 1.0)
+        finally:
+            # The next step needs it, however this one ended.
+            soon(lambda: slave.is_free, "its time-out", 15.0)
+        expect("time-outs", slave.timeouts, 0)
         return f"exit {status} after {seconds:.2f} s"
 
     def leaves_at_once_on_ctrl_c_while_it_listens(self) -> str:
@@ -592,11 +699,11 @@ class Commission(Walk[Frame]):
         """All steps; a segment of its own where a step needs one."""
         self.folder = folder
         self.model = Encoder(RAW)
-        self.encoder = Slave(ENCODER_MAC, self.model.device, inputs=RAW.to_bytes(4, "little"))
+        self.encoder = Slave(ENCODER_MAC, self.model.device, inputs=lambda: self.model.inputs)
         self.valves = Slave(VALVES_MAC, valve_terminal())
         self.stub = Slave(STUB_MAC, valve_terminal(full=False))
         other = Encoder(RAW, serial=815)
-        self.owned = Slave(OWNED_MAC, other.device, inputs=RAW.to_bytes(4, "little"))
+        self.owned = Slave(OWNED_MAC, other.device, inputs=lambda: other.inputs)
         with self.segment(*self.all):
             self.owner = Owner(self.medium.port, OWNED_MAC)
             try:
@@ -616,8 +723,9 @@ class Commission(Walk[Frame]):
             "Scan": [
                 self.scans_after_a_second_of_silence,
                 self.finds_all_with_their_identity,
-                self.names_the_owner_and_leaves_his_slave_alone,
+                self.leaves_the_slave_of_another_alone,
                 self.releases_whom_it_asked_and_writes_nothing,
+                self.names_an_owner_who_says_his_name,
                 self.shows_a_table_to_people,
                 self.finds_its_own_address_taken,
             ],
@@ -637,17 +745,23 @@ class Commission(Walk[Frame]):
                 self.refuses_to_write_what_is_read_only,
                 self.notices_a_device_that_ignores_a_write,
                 self.writes_in_fragments,
+                self.writes_once_though_the_answer_is_lost,
+                self.knows_no_position_of_a_stranger,
             ],
             "Trouble": [
                 self.tells_who_never_answers,
                 self.gives_up_at_the_timeout,
+                self.opens_the_adapter_at_the_rate_that_is_asked_for,
                 self.waits_for_a_slow_device,
             ],
             "Slaves of others": [self.watches_passively, self.takes_no_slave_from_its_master],
             "Leaving": [
                 self.releases_on_ctrl_c_while_it_watches,
-                self.releases_on_ctrl_c_while_it_waits_for_an_answer,
+                self.releases_on_ctrl_c_while_it_opens,
+                self.releases_on_ctrl_c_while_it_reads,
                 self.leaves_at_once_on_ctrl_c_while_it_listens,
+                self.defends_its_own_address,
+                self.takes_up_what_a_killed_one_left,
             ],
             "The encoder": [
                 self.reads_the_encoder,

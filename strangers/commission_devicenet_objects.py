@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from devicenet_master import GET, GET_ALL, GET_ENUM_STRING, RESET, RESTORE, SAVE, SET
 from steps import position_at
 
-IDENTITY, MESSAGE_ROUTER, DEVICENET, PARAMETER, ENCODER, VALVES = 0x01, 0x02, 0x03, 0x0F, 0x2F, 0x64
+IDENTITY, MESSAGE_ROUTER, DEVICENET, ASSEMBLY, PARAMETER = 0x01, 0x02, 0x03, 0x04, 0x0F
+ENCODER, VALVES = 0x2F, 0x64
 
 # Elementary data types
 BOOL, SINT, INT, DINT, USINT, UINT, UDINT = 0xC1, 0xC2, 0xC3, 0xC4, 0xC6, 0xC7, 0xC8
@@ -361,11 +362,14 @@ class Encoder:
         }
         self.kept = self._settings()
         self.defaults = self._settings()
+        # Chapter 6: the position, and in instance 2 the flags besides.
+        self.assemblies = {1: {3: Attribute(USINT, b"")}, 2: {3: Attribute(USINT, b"")}}
         self._refresh()
         self.device = Device(
             {
                 IDENTITY: {1: identity(468, 0, 0x0A, serial, "AMG 11 - Multiturn")},
                 MESSAGE_ROUTER: {1: {}},
+                ASSEMBLY: self.assemblies,
                 ENCODER: {1: self.attributes},
             },
             linked_class=ENCODER,
@@ -421,3 +425,10 @@ class Encoder:
         # Not more than the shaft can turn: steps per turn times the turns of the disc.
         self.attributes[8].limits = (1, steps * self.TURNS)
         self.attributes[80].value = 0x06 | bool(self.number(3))
+        position = packed(DINT, self.number(12))
+        self.assemblies[1][3].value, self.assemblies[2][3].value = position, position + b"\0"
+
+    @property
+    def inputs(self) -> bytes:
+        """What a poll brings: instance 1 of the Assembly object."""
+        return self.assemblies[1][3].octets()

@@ -9,6 +9,7 @@ to run: the walk `commission_devicenet.py` builds on it, `commission_test.py` ju
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from commission_devicenet_objects import DEVICENET, Device, Refusal
@@ -69,14 +70,17 @@ class Temper:
 
     # Refused with (general status, additional code), by service, by the class of the device's own.
     refuse: dict[int, tuple[int, int]] = field(default_factory=dict)
-    # Seconds until an explicit response leaves.
+    # Seconds until an explicit response leaves, from that request on.
     late: float = 0.0
+    late_from: int = 0
     # Counts of response fragments that get lost, once each.
     lost_fragments: set[int] = field(default_factory=set)
     # Counts of request fragments whose acknowledge gets lost, once each.
     lost_acknowledges: set[int] = field(default_factory=set)
     # Explicit requests after which it is dead.
     dies_after: int | None = None
+    # Sets that it does and does not answer, counted from the next.
+    swallows_sets: int = 0
     # A Set is acknowledged and does nothing.
     ignores_sets: bool = False
 
@@ -100,9 +104,16 @@ class Slave(Node[Frame]):
 
     BAUD = 0
 
-    def __init__(self, mac: int, device: Device, inputs: bytes = b"", body_format: int = 0) -> None:
+    def __init__(
+        self,
+        mac: int,
+        device: Device,
+        inputs: Callable[[], bytes] = bytes,
+        body_format: int = 0,
+    ) -> None:
         self.mac = mac
         self.device = device
+        # What a poll brings.
         self.inputs = inputs
         # 0: class and instance in 8 bits each, 1: 8/16, 2: 16/16, 3: 16/8.
         self.body_format = body_format
@@ -257,7 +268,7 @@ class Slave(Node[Frame]):
             return
         connection.alive_at = time.time()
         self.polls += 1
-        self.send(Frame(time.time(), poll_response_identifier(self.mac), self.inputs))
+        self.send(Frame(time.time(), poll_response_identifier(self.mac), self.inputs()))
 
     def _watch(self) -> None:
         """Ends connections that nobody has fed."""
@@ -331,7 +342,10 @@ class Slave(Node[Frame]):
             answer = bytes([body[0] | 0x80]) + self._serve(asked)
         except Refusal as refusal:
             answer = bytes([ERROR, refusal.status, refusal.additional])
-        if self.temper.late:
+        if body[0] == SET and class_id != CONNECTION and self.temper.swallows_sets:
+            self.temper.swallows_sets -= 1
+            return
+        if self.temper.late and len(self.asked) >= self.temper.late_from:
             self.after(self.temper.late, lambda: self._respond(header, answer))
         else:
             self._respond(header, answer)
@@ -376,7 +390,7 @@ class Slave(Node[Frame]):
             4: produced.to_bytes(2, "little"),
             5: consumed.to_bytes(2, "little"),
             6: b"\x21" if is_explicit else b"\x01",
-            7: (192 if is_explicit else len(self.inputs)).to_bytes(2, "little"),
+            7: (192 if is_explicit else len(self.inputs())).to_bytes(2, "little"),
             8: (64 if is_explicit else 0).to_bytes(2, "little"),
             9: connection.packet_rate.to_bytes(2, "little"),
             12: bytes([is_explicit]),

@@ -38,6 +38,8 @@ class Guest:
     connected_at: float
     opened_at: float | None = None
     left_at: float | None = None
+    # The number that it gave with `S`: 4 is 125k, 5 is 250k, 6 is 500k.
+    rate: str = ""
     arrived: bytes = b""
     arrived_at: float = 0.0
     # Octets that the guest wrote, whatever they mean.
@@ -281,6 +283,8 @@ class CanSegment(Medium[Frame]):
         if kind in ("O", "L"):
             guest.opened_at = time.time()
             return b"\r"
+        if kind == "S":
+            guest.rate = command[1:]
         if kind == "C":
             guest.opened_at = None
             return b"\r"

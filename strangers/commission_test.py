@@ -40,7 +40,7 @@ class DeviceNetSlaveGoesByTheBook(unittest.TestCase):
         return segment, master
 
     def valves(self, **options: object) -> tuple[Slave, book.Master]:
-        slave = Slave(9, valve_terminal(), inputs=b"\x01\x02", **options)
+        slave = Slave(9, valve_terminal(), inputs=lambda: b"\x01\x02", **options)
         _, master = self.joined(slave)
         return slave, master
 
