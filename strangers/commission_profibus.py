@@ -249,7 +249,8 @@ class Commission(Walk[bytes]):
 
     def tells_that_the_total_must_be_lower(self) -> str:
         """3600 is a number of steps, but 3600 x 65536 is less than the total that is in force."""
-        self.asked_as(self.encoder, "reset", "--yes")[0].ended(OK)
+        for key, value in (("steps-per-turn", 8192), ("total-resolution", TOTAL)):
+            self.asked_as(self.encoder, "set", key, str(value), "--yes")[0].ended(OK)
         outcome, _ = self.asked_as(self.encoder, "set", "steps-per-turn", "3600", "--yes")
         outcome.ended(REFUSED, "total", "235929600")
         expect("in force", (self.model.steps, self.model.total), (8192, TOTAL))
