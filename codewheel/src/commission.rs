@@ -13,6 +13,7 @@ mod passport;
 mod passports;
 mod preset;
 mod progress;
+mod ring;
 mod scan;
 mod service;
 mod set;
@@ -51,13 +52,17 @@ pub(crate) fn identify(
 }
 
 pub(crate) fn get(arguments: &GetArguments, chatter: Chatter) -> Result<ExitCode, Failure> {
-    let got = with(&arguments.encoder, chatter, |encoder| get::run(encoder, arguments));
+    let got = value::names(&arguments.names).and_then(|names| {
+        with(&arguments.encoder, chatter, |encoder| get::run(encoder, &names, arguments.format))
+    });
     end(got, arguments.format.json)
 }
 
 pub(crate) fn set(arguments: &SetArguments, chatter: Chatter) -> Result<ExitCode, Failure> {
-    let set = writing(&arguments.encoder, arguments.consent, chatter, |encoder| {
-        set::run(encoder, arguments)
+    let set = value::name(&arguments.name).and_then(|name| {
+        writing(&arguments.encoder, arguments.consent, chatter, |encoder| {
+            set::run(encoder, &name, arguments)
+        })
     });
     end(set, arguments.format.json)
 }

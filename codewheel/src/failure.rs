@@ -41,14 +41,14 @@ pub(crate) enum Failure {
         /// Why it cannot be read.
         reason: ReadError,
     },
-    #[error("cannot read {}: {reason}", .path.display())]
+    #[error("cannot read {}: {reason}; check its name and its rights", .path.display())]
     Read {
         /// What was to be read.
         path: PathBuf,
         /// What the system said.
         reason: io::Error,
     },
-    #[error("{} is no passport that can be used:\n{reason}", .path.display())]
+    #[error("{} is no passport that can be used:\n{}", .path.display(), .reason.to_string().trim_end())]
     Passport {
         /// The file.
         path: PathBuf,

@@ -2,7 +2,8 @@
 
 use crate::arguments::commission::EncoderAddress;
 
-/// The command `words` for the encoder at `at`, quoted for a shell.
+/// The command `words` for the encoder at `at`, quoted for a shell. Parameters are left out: by then
+/// the encoder works with them.
 pub(super) fn command(words: &[&str], at: &EncoderAddress) -> String {
     let mut all = vec!["codewheel".to_owned()];
     all.extend(words.iter().map(|word| (*word).to_owned()));
@@ -14,9 +15,6 @@ pub(super) fn command(words: &[&str], at: &EncoderAddress) -> String {
     option("--baud", bus.baud.clone());
     option("--address", at.address.map(|address| address.to_string()));
     option("--master", bus.master.map(|address| address.to_string()));
-    for parameter in &at.parameters {
-        option("--parameter", Some(parameter.clone()));
-    }
     if bus.join {
         all.push("--join".to_owned());
     }
@@ -53,8 +51,6 @@ mod tests {
             "--master",
             "9",
             "--yes",
-            "--parameter",
-            "scaling=on",
         ];
         let Some(Verb::Set(set)) = Arguments::parse_from(words).verb else { panic!("set") };
         let text = command(&["set", "direction", "cw"], &set.encoder);
@@ -73,8 +69,6 @@ mod tests {
                 "5",
                 "--master",
                 "9",
-                "--parameter",
-                "scaling=on",
             ]
         );
     }

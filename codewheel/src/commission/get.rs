@@ -2,18 +2,16 @@
 
 use std::io::Write;
 
-use codewheel_commission::Value;
+use codewheel_commission::{Name, Value};
 use codewheel_device::product::Bus;
 use comfy_table::{Table, presets};
 
 use super::encoder::Encoder;
 use super::value::{self, Line};
-use crate::arguments::commission::GetArguments;
+use crate::arguments::commission::Format;
 use crate::failure::Failure;
 
-pub(super) fn run(encoder: &mut Encoder, arguments: &GetArguments) -> Result<(), Failure> {
-    let names: Vec<_> =
-        arguments.names.iter().map(|text| value::name(text)).collect::<Result<_, _>>()?;
+pub(super) fn run(encoder: &mut Encoder, names: &[Name], format: Format) -> Result<(), Failure> {
     let values = if names.is_empty() {
         encoder.session.values()?
     } else {
@@ -21,7 +19,7 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &GetArguments) -> Result<(),
         read.collect::<Result<Vec<_>, _>>()?
     };
     let mut out = std::io::stdout().lock();
-    if arguments.format.json {
+    if format.json {
         for value in &values {
             let line = serde_json::to_string(&Line::from(value)).map_err(std::io::Error::from)?;
             writeln!(out, "{line}")?;
@@ -43,6 +41,7 @@ fn table(bus: Bus, values: &[Value]) -> String {
         let takes = match (value.range, value::known(bus, value)) {
             _ if !value.writable => String::new(),
             (_, (labels @ [_, ..], _)) => labels.join(", "),
+            (Some((least, most)), _) if least == most => least.to_string(),
             (Some((least, most)), _) => format!("{least}–{most}"),
             (None, _) => String::new(),
         };

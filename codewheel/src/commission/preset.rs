@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::command_line::command;
 use super::encoder::Encoder;
+use super::ring::{moved, shortest};
 use super::settings::{tell_how_long, tell_undo};
 use crate::arguments::commission::PresetArguments;
 use crate::failure::Failure;
@@ -28,7 +29,7 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
     let is_turning = first != before;
     let wanted = match (arguments.value, arguments.by, range) {
         (Some(value), _, _) => value,
-        (None, Some(by), Some(range)) => wrapped(before, by, range),
+        (None, Some(by), Some(range)) => moved(before, by, range),
         (None, _, _) => {
             return Err(Failure::Usage(
                 "this device does not tell its measuring range, so nobody knows where the position \
@@ -46,7 +47,7 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
     let undo = match range {
         // Wherever the shaft stands then.
         Some(range) => {
-            let by = shortest(wanted, before, range).to_string();
+            let by = shortest(i64::from(before) - i64::from(wanted), range.into()).to_string();
             command(&["preset", "--by", &by], encoder.at)
         }
         None => command(&["preset", &before.to_string()], encoder.at),
@@ -61,9 +62,8 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
     }
     tell_undo(&undo, encoder);
     tell_how_long(encoder);
-    let off = range.map_or(i64::from(sample.position) - i64::from(wanted), |range| {
-        shortest(wanted, sample.position, range)
-    });
+    let off = i64::from(sample.position) - i64::from(wanted);
+    let off = shortest(off, range.map_or(0, i64::from));
     // A shaft that stands may stand between two steps.
     if is_turning || off.abs() <= 1 {
         return Ok(());
@@ -75,35 +75,4 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
         "if the shaft has moved meanwhile, stop it and do it again",
     )
     .into())
-}
-
-/// `position` moved by `by` in a measuring range.
-fn wrapped(position: u32, by: i64, range: u32) -> u32 {
-    let moved = i128::from(position) + i128::from(by);
-    u32::try_from(moved.rem_euclid(i128::from(range))).unwrap_or(position)
-}
-
-/// The shortest way in a measuring range.
-fn shortest(from: u32, to: u32, range: u32) -> i64 {
-    let range = i64::from(range);
-    let way = (i64::from(to) - i64::from(from)).rem_euclid(range);
-    if way > range / 2 { way - range } else { way }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_preset_is_undone_by_the_way_back_around_the_end_of_the_range() {
-        for (before, wanted) in [(0, 999), (999, 0), (10, 20), (20, 10), (0, 500), (501, 0)] {
-            let by = shortest(wanted, before, 1_000);
-            assert_eq!(wrapped(wanted, by, 1_000), before, "{before} {wanted}");
-            assert!(by.abs() <= 500);
-        }
-        assert_eq!(
-            wrapped(5, i64::MIN, 1_000),
-            (5 - i128::from(i64::MIN.unsigned_abs())).rem_euclid(1_000) as u32
-        );
-    }
 }

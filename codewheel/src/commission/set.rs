@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use codewheel_commission::{Kind, Reading, Trouble, Value};
+use codewheel_commission::{Kind, Name, Reading, Trouble, Value};
 use codewheel_datasheet::hilo;
 use codewheel_device::product::Bus;
 use codewheel_device::profibus::parameters::{Field, Row};
@@ -23,15 +23,24 @@ struct Line<'a> {
     undo: &'a [String],
 }
 
-pub(super) fn run(encoder: &mut Encoder, arguments: &SetArguments) -> Result<(), Failure> {
-    let name = value::name(&arguments.name)?;
+pub(super) fn run(
+    encoder: &mut Encoder,
+    name: &Name,
+    arguments: &SetArguments,
+) -> Result<(), Failure> {
     let bus = encoder.session.bus();
-    let old = encoder.session.value(&name)?;
+    let old = encoder.session.value(name)?;
     if old.name == "preset" {
         return Err(Failure::Usage(
             "a preset moves the position: write `codewheel preset VALUE`, which shows what it does"
                 .to_owned(),
         ));
+    }
+    let (labels, note) = value::known(bus, &old);
+    if !old.writable && bus == Bus::Profibus && Row::find(&old.name).is_some() {
+        // A parameter that belongs to another master: the refusal says to whom.
+        let wanted = value::parse(&arguments.value, &old, labels)?;
+        encoder.session.write(name, &wanted)?;
     }
     if !old.writable {
         return Err(Failure::Usage(format!(
@@ -40,7 +49,6 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &SetArguments) -> Result<(),
             value::with_unit(&old)
         )));
     }
-    let (labels, note) = value::known(bus, &old);
     let wanted = value::parse(&arguments.value, &old, labels)?;
     if wanted == old.reading {
         encoder.say(&format!("{} is {} already", old.name, value::with_unit(&old)));
@@ -62,7 +70,7 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &SetArguments) -> Result<(),
     arguments.consent.ask("Write it?", encoder)?;
     let after_write = encoder
         .session
-        .write(&name, &wanted)
+        .write(name, &wanted)
         .map_err(|trouble| with_range(trouble, encoder, &old, &wanted))?;
     let after = Settings::of(encoder)?;
     let undo = before.undo(&after, encoder);
@@ -80,7 +88,12 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &SetArguments) -> Result<(),
     tell_undo(&undo, encoder);
     match bus {
         Bus::DeviceNet => tell_how_long_it_lasts(&old.name, encoder),
-        Bus::Profibus => tell_project(encoder, &after_write),
+        Bus::Profibus => {
+            if let parameters @ [_, ..] = encoder.at.parameters.as_slice() {
+                encoder.say(&format!("what --parameter gave stays: {}", parameters.join(", ")));
+            }
+            tell_project(encoder, &after_write);
+        }
     }
     if after_write.reading == wanted {
         return Ok(());

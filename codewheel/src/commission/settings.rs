@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::command_line::command;
 use super::encoder::Encoder;
+use super::ring::shortest;
 use super::value::{json, shown, with_unit, writable};
 
 /// Settings by whose change a device forgets its offset, in the order in which they are written:
@@ -61,13 +62,13 @@ impl Settings {
     /// Reads all of them.
     pub(super) fn of(encoder: &mut Encoder) -> Result<Self, Trouble> {
         let all = encoder.session.values()?;
-        let number = |value: &Value| match value.reading {
-            Reading::Number(number) => Some(number),
-            _ => None,
-        };
         let offset = all.iter().find(|value| value.name == "offset").and_then(number);
         let values = all.into_iter().filter(|value| value.setting).collect();
         Ok(Self { values, offset })
+    }
+
+    fn number(&self, key: &str) -> Option<i64> {
+        self.values.iter().find(|value| value.name == key).and_then(number)
     }
 
     /// What is different in `after`, in its order.
@@ -117,11 +118,19 @@ impl Settings {
             })
             .collect();
         let left = if forgets { 0 } else { after.offset.unwrap_or_default() };
-        match self.offset.map(|offset| offset - left) {
+        let range = self.number("total-resolution").unwrap_or_default();
+        match self.offset.map(|offset| shortest(offset - left, range)) {
             None | Some(0) => {}
             Some(by) => commands.push(command(&["preset", "--by", &by.to_string()], encoder.at)),
         }
         commands
+    }
+}
+
+fn number(value: &Value) -> Option<i64> {
+    match value.reading {
+        Reading::Number(number) => Some(number),
+        _ => None,
     }
 }
 

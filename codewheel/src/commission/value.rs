@@ -30,6 +30,11 @@ pub(super) fn name(text: &str) -> Result<Name, Failure> {
     })
 }
 
+/// Reads names.
+pub(super) fn names(texts: &[String]) -> Result<Vec<Name>, Failure> {
+    texts.iter().map(|text| name(text)).collect()
+}
+
 /// What our own devices say of a value besides: the names of its numbers, and what a change does.
 pub(super) fn known(bus: Bus, value: &Value) -> (&'static [&'static str], &'static str) {
     let row = match bus {

@@ -1,5 +1,7 @@
 //! The program as its users meet it at the prompt.
 
+#[cfg(unix)]
+mod commission;
 mod data_sheets;
 mod demo;
 mod descriptions;

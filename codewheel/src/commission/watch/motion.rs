@@ -6,6 +6,8 @@ use codewheel_commission::Sample;
 use codewheel_station::{Duration, Instant};
 use serde::Serialize;
 
+use crate::commission::ring::shortest;
+
 /// The speed is the mean of so long a time: long enough that a step more or less does not shake it.
 const WINDOW: Duration = Duration::from_millis(250);
 /// How many seconds the picture of the speed goes back.
@@ -79,7 +81,8 @@ impl Motion {
         let begun = *self.begun.get_or_insert(sample.at);
         let last = self.last.replace(sample);
         if let Some(last) = last {
-            self.way += self.step(last.position, sample.position);
+            let way = i64::from(sample.position) - i64::from(last.position);
+            self.way += shortest(way, self.scale.total_resolution.map_or(0, i64::from));
         }
         self.recent.push_back((sample.at, self.way));
         while self.recent.get(1).is_some_and(|(at, _)| sample.at.since(*at) >= WINDOW) {
@@ -114,18 +117,6 @@ impl Motion {
     /// The speed in the seconds of the last minute, oldest first, in steps a second.
     pub(super) fn minute(&self) -> impl ExactSizeIterator<Item = f64> + Clone {
         self.minute.iter().copied()
-    }
-
-    /// The shorter way around the measuring range.
-    fn step(&self, from: u32, to: u32) -> i64 {
-        let way = i64::from(to) - i64::from(from);
-        match self.scale.total_resolution.map(i64::from) {
-            Some(range @ 1..) => {
-                let way = way.rem_euclid(range);
-                if way > range / 2 { way - range } else { way }
-            }
-            _ => way,
-        }
     }
 
     fn speed(&self) -> Option<f64> {

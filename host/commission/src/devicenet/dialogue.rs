@@ -59,6 +59,11 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
         std::mem::take(&mut self.notices)
     }
 
+    /// Has people hear something.
+    pub(super) fn notice(&mut self, notice: String) {
+        self.notices.push(notice);
+    }
+
     /// Lets time pass until `done` gives something; `None` where it does not within `patience`.
     pub(super) fn wait<T>(
         &mut self,
@@ -102,30 +107,43 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
         Ok(())
     }
 
-    /// Listens until nothing but listening was done for `span`, since whenever.
+    /// Listens until the bus was heard for `span` without a break; what was heard before counts.
     pub(super) fn listen(
+        &mut self,
+        tried: &str,
+        span: Duration,
+        progress: impl FnMut(u8),
+    ) -> Result<(), Trouble> {
+        let now = self.now();
+        let heard = self.console().overheard().span(now);
+        let left = Duration::from_nanos(span.as_nanos().saturating_sub(heard.as_nanos()));
+        self.listen_for(tried, left, progress)
+    }
+
+    /// Listens for `span` from now on.
+    pub(super) fn listen_for(
         &mut self,
         tried: &str,
         span: Duration,
         mut progress: impl FnMut(u8),
     ) -> Result<(), Trouble> {
-        let limit = span + Duration::from_secs(1);
+        let begun = self.now();
         let mut told = None;
-        self.wait(tried, limit, |console, now| {
-            let heard = console.overheard().span(now);
-            let percent = heard.as_nanos().saturating_mul(100) / span.as_nanos().max(1);
+        self.wait(tried, span, |_, now| {
+            let percent = now.since(begun).as_nanos().saturating_mul(100) / span.as_nanos().max(1);
             let percent = percent.min(100) as u8;
             if told != Some(percent) {
                 told = Some(percent);
                 progress(percent);
             }
-            (heard >= span).then_some(())
+            None::<()>
         })?;
         // An adapter that was lost before hears nothing.
         let console = self.console();
-        match (console.fault(), console.mac()) {
-            (Some(fault), own) => Err(troubles::fault(tried, fault, own)),
-            (None, _) => Ok(()),
+        match console.fault() {
+            // That our address is taken keeps us from speaking alone.
+            None | Some(Fault::DuplicateMac) => Ok(()),
+            Some(fault) => Err(troubles::fault(tried, fault, console.mac())),
         }
     }
 
@@ -182,16 +200,16 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
         if let Some(owner) = self.console().owner(now, mac) {
             return Err(self.owned(tried, mac, owner));
         }
-        let added = self.console().scanner_mut().map(|scanner| scanner.add(settings));
+        let mut added = self.add(settings);
+        if added == Some(Err(NotAdded::AddressInUse)) && self.console().mac() != Some(mac) {
+            // A session before was dropped without a release.
+            self.release(tried, mac)?;
+            added = self.add(settings);
+        }
         match added {
             Some(Ok(())) => {}
             Some(Err(NotAdded::AddressInUse | NotAdded::Full)) => {
-                let own = self.console().mac();
-                let came = if own == Some(mac) {
-                    format!("MAC ID {mac} is our own")
-                } else {
-                    format!("MAC ID {mac} is being served already")
-                };
+                let came = format!("MAC ID {mac} is our own");
                 return Err(Trouble::new(Kind::Usage, tried, came, "give another address"));
             }
             None => return Err(troubles::not_on_line(tried)),
@@ -219,6 +237,10 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
         // What went wrong before is what people must hear.
         let _ = self.release(tried, mac);
         Err(trouble)
+    }
+
+    fn add(&mut self, settings: SlaveSettings) -> Option<Result<(), NotAdded>> {
+        self.console().scanner_mut().map(|scanner| scanner.add(settings))
     }
 
     /// Releases the slave, if it was allocated.
@@ -250,17 +272,15 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
                 Response::TooLong => Some(Answer::TooLong),
                 Response::NoAnswer => None,
             })
-        })?;
-        match answer {
-            Some(Some(answer)) => Ok(answer),
-            Some(None) => Err(self.no_answer(tried, mac)),
-            None => {
-                if let Some(scanner) = self.console().scanner_mut() {
-                    scanner.cancel(ticket);
-                }
-                Err(self.no_answer(tried, mac))
-            }
+        });
+        if let Ok(Some(Some(answer))) = answer {
+            return Ok(answer);
         }
+        // A ticket that nobody asks for keeps the slave from being asked anew.
+        if let Some(scanner) = self.console().scanner_mut() {
+            scanner.cancel(ticket);
+        }
+        Err(answer.err().unwrap_or_else(|| self.no_answer(tried, mac)))
     }
 
     fn hand_in(
@@ -273,9 +293,9 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
         let handed = self.wait(tried, ALLOCATION_TIME, |console, _| {
             let Some(scanner) = console.scanner_mut() else { return Some(Err(NotTaken::OffLine)) };
             match scanner.request(mac, body, patience) {
-                // It was lost and is being brought back.
+                // It was lost and is being brought back; so is our controller after a bus-off.
                 Err(NotTaken::NotRunning | NotTaken::Busy | NotTaken::OffLine)
-                    if scanner.faulted().is_none() =>
+                    if matches!(scanner.faulted(), None | Some(Fault::BusOff)) =>
                 {
                     None
                 }
@@ -293,7 +313,7 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
             Some(Err(NotTaken::UnknownSlave)) => Err(Trouble::new(
                 Kind::Usage,
                 tried,
-                format!("the device at MAC ID {mac} was released"),
+                format!("there is no connection to the device at MAC ID {mac} any more"),
                 "open it anew",
             )),
             Some(Err(_)) | None => Err(self.no_answer(tried, mac)),

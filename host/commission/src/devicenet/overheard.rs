@@ -193,6 +193,38 @@ impl Heard {
         }
     }
 
+    fn produced(&mut self, now: Instant, data: &[u8], is_ours: bool) {
+        self.answered_at = Some(now);
+        if data.is_empty() {
+            return;
+        }
+        if !is_ours {
+            self.productions.came(now);
+        }
+        let mut production = Production { at: now, octets: [0; 8], length: data.len() as u8 };
+        for (to, from) in production.octets.iter_mut().zip(data) {
+            *to = *from;
+        }
+        self.production = Some(production);
+    }
+
+    fn asked(&mut self, master: MacId, message: u8, body: &[u8]) {
+        let kind = match *body {
+            [service, class::DEVICENET, 1, choice, allocator, ..]
+                if service == Service::ALLOCATE.0 =>
+            {
+                Kind::Allocate { choice, allocator: MacId::from_low_bits(allocator.into()) }
+            }
+            [service, class::DEVICENET, 1, choice, ..] if service == Service::RELEASE.0 => {
+                Kind::Release { choice }
+            }
+            _ if message == EXPLICIT_REQUEST => Kind::Connected,
+            // What else the unconnected port is asked is a search, and no ownership.
+            _ => return,
+        };
+        self.question = Some(Question { master, kind });
+    }
+
     fn answered(&mut self, now: Instant, header: Header, body: &[u8]) {
         self.answered_at = Some(now);
         let Some(question) = self.question.take_if(|question| question.master == header.mac())
@@ -336,39 +368,5 @@ impl Overheard {
             }
             _ => {}
         }
-    }
-}
-
-impl Heard {
-    fn produced(&mut self, now: Instant, data: &[u8], is_ours: bool) {
-        self.answered_at = Some(now);
-        if data.is_empty() {
-            return;
-        }
-        if !is_ours {
-            self.productions.came(now);
-        }
-        let mut production = Production { at: now, octets: [0; 8], length: data.len() as u8 };
-        for (to, from) in production.octets.iter_mut().zip(data) {
-            *to = *from;
-        }
-        self.production = Some(production);
-    }
-
-    fn asked(&mut self, master: MacId, message: u8, body: &[u8]) {
-        let kind = match *body {
-            [service, class::DEVICENET, 1, choice, allocator, ..]
-                if service == Service::ALLOCATE.0 =>
-            {
-                Kind::Allocate { choice, allocator: MacId::from_low_bits(allocator.into()) }
-            }
-            [service, class::DEVICENET, 1, choice, ..] if service == Service::RELEASE.0 => {
-                Kind::Release { choice }
-            }
-            _ if message == EXPLICIT_REQUEST => Kind::Connected,
-            // What else the unconnected port is asked is a search, and no ownership.
-            _ => return,
-        };
-        self.question = Some(Question { master, kind });
     }
 }

@@ -54,7 +54,7 @@ pub fn listen<S: Seat<Station = Console>>(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Survey, Trouble> {
     let mut dialogue = Dialogue::new(seat);
-    dialogue.listen("listen to the bus", span, |percent| {
+    dialogue.listen_for("listen to the bus", span, |percent| {
         progress(Progress { doing: "listening".to_owned(), percent });
     })?;
     let now = dialogue.now();
@@ -88,9 +88,14 @@ pub fn scan<S: Seat<Station = Console>>(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Survey, Trouble> {
     const TRIED: &str = "scan the bus";
+    let mut told = None;
     let mut tell = |doing: String, from: u8, to: u8, percent: u8| {
         let percent = u16::from(from) + u16::from(to - from) * u16::from(percent) / 100;
-        progress(Progress { doing, percent: percent.min(100) as u8 });
+        let now = Progress { doing, percent: percent.min(100) as u8 };
+        if told.as_ref() != Some(&now) {
+            progress(now.clone());
+            told = Some(now);
+        }
     };
     let mut dialogue = Dialogue::new(seat);
     dialogue.listen(TRIED, settings.listen.max(LISTEN_TIME), |percent| {
@@ -170,11 +175,14 @@ fn look_at<S: Seat<Station = Console>>(
     let now = dialogue.now();
     let heard = dialogue.console().overheard().node(mac);
     let mut node = found(now, mac, &heard);
-    let is_asked =
-        presence == Presence::Answers && heard.owner(now).is_none() && heard.role() != Role::Master;
+    let is_slave = heard.role() == Role::Slave;
+    let is_asked = presence == Presence::Answers && is_slave && heard.owner(now).is_none();
     if presence == Presence::Checking {
         node.state = "checks its MAC ID".to_owned();
         node.lamp = Some("off");
+    } else if presence == Presence::Answers && node.role == Role::Unknown {
+        // A forced scan finds it: it defends its address, and is no Group 2 Only Server.
+        node.state = "on-line, and no slave; perhaps a master".to_owned();
     }
     if !is_asked {
         return Ok(node);
@@ -280,18 +288,21 @@ fn state_of_free(status: Option<u16>) -> String {
     state
 }
 
+/// What to tell of an address that two nodes want.
+pub(super) fn contested(mac: MacId) -> String {
+    format!(
+        "two nodes have MAC ID {mac}: the one that came later is red and silent; give it another \
+         address and switch it on anew"
+    )
+}
+
 /// What people should know besides the nodes.
 fn remarks(console: &Console) -> Vec<String> {
     let overheard = console.overheard();
     let mut remarks: Vec<String> = overheard
         .nodes()
         .filter(|(_, heard)| heard.contested_at.is_some())
-        .map(|(mac, _)| {
-            format!(
-                "two nodes have MAC ID {mac}: the one that came later is red and silent; give it \
-                 another address and switch it on anew"
-            )
-        })
+        .map(|(mac, _)| contested(mac))
         .collect();
     let strays = overheard
         .nodes()

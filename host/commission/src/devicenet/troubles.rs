@@ -64,8 +64,8 @@ pub(super) fn nobody(tried: &str, mac: MacId) -> Trouble {
         Kind::TimeOut,
         tried,
         format!("no node answered at MAC ID {mac}"),
-        "check its power and its address switches, or scan to see who is there; one that was just \
-         switched on needs two seconds",
+        "check its power, its address switches and the bit rate, or scan to see who is there; one \
+         that was just switched on needs two seconds",
     )
 }
 

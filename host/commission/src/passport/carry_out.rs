@@ -147,8 +147,23 @@ impl Course<'_> {
         })
     }
 
+    /// Watches the shaft: a preset is for a machine that stands.
+    fn at_rest(&mut self, total: u32) -> Result<u32, Trouble> {
+        let watched = measure::watch(self.session, self.plan.watch, Some(total))?;
+        if watched.at_rest {
+            return Ok(watched.position);
+        }
+        Err(Trouble::new(
+            Kind::Refused,
+            self.tried("set the position"),
+            "its shaft turns, and a preset is for a machine that stands",
+            "stop the machine and apply the passport again",
+        ))
+    }
+
     fn restore_offset(&mut self, wanted: i64) -> Result<(), Trouble> {
         let total = self.total()?;
+        self.at_rest(total)?;
         let was = take::offset(self.session)?;
         let mut now = was;
         for _ in 0..ATTEMPTS {
@@ -165,24 +180,15 @@ impl Course<'_> {
         Err(Trouble::new(
             Kind::Differs,
             self.tried("restore the offset"),
-            format!("the offset became {now}, not {wanted}: the shaft turns"),
+            format!("the offset became {now}, not {wanted}: the shaft moves"),
             "stop the machine and apply the passport again",
         ))
     }
 
     fn preset(&mut self, wanted: u32) -> Result<(), Trouble> {
         let total = self.total()?;
-        let watched = measure::watch(self.session, self.plan.watch, Some(total))?;
-        if !watched.at_rest {
-            return Err(Trouble::new(
-                Kind::Refused,
-                self.tried("set the position"),
-                "its shaft turns, and a preset is for a machine that stands",
-                "stop the machine and apply the passport again",
-            ));
-        }
-        let sample = self.session.preset(wanted)?;
-        let [was, is] = [watched.position, sample.position];
+        let was = self.at_rest(total)?;
+        let is = self.session.preset(wanted)?.position;
         self.step("position", Some(Reading::Number(was.into())), Some(Reading::Number(is.into())));
         if distance(is, wanted, Some(total)) <= 1 {
             return Ok(());

@@ -74,6 +74,9 @@ pub struct Plan {
 /// turn set the total resolution (AMG manual §8).
 const GEOMETRY: [&str; 3] = ["direction", STEPS_PER_TURN, TOTAL_RESOLUTION];
 
+/// n and T.
+const SCALE: [&str; 2] = [STEPS_PER_TURN, TOTAL_RESOLUTION];
+
 /// Finds what makes the encoder of `session` give the positions of `passport`. It takes a passport of
 /// the encoder as it is, and writes nothing.
 ///
@@ -100,8 +103,7 @@ pub fn plan(
             format!("take a passport of an encoder on {}", session.bus()),
         ));
     }
-    let values = session.values()?;
-    let before = take::take(session, circumstances)?;
+    let (before, values) = take::take_with_values(session, circumstances)?;
     fit::check(passport, &before, &values, session, &mut warnings)?;
     let changes = changes(passport, &before);
     let positioning = positioning(passport, &before, &changes, position, session, &mut warnings)?;
@@ -122,6 +124,8 @@ fn changes(goal: &Passport, before: &Passport) -> Vec<Change> {
     let mut changes: Vec<Change> = differences
         .into_iter()
         .filter(|difference| difference.subject == Subject::Setting && difference.is.is_some())
+        // Nobody looks at these without scaling.
+        .filter(|difference| !goal.is_unscaled() || !SCALE.contains(&difference.name.as_str()))
         .map(|Difference { name, was, is, .. }| Change {
             clears_offset: GEOMETRY.contains(&name.as_str()),
             name,
@@ -146,31 +150,24 @@ fn changes(goal: &Passport, before: &Passport) -> Vec<Change> {
 
 /// The names of all settings of `goal`: what others depend on first.
 fn order<'a>(goal: &'a Passport, before: &Passport) -> Vec<&'a str> {
-    let mut first = match goal.bus {
+    let first = match goal.bus {
         Bus::DeviceNet => GEOMETRY.to_vec(),
         Bus::Profibus => {
-            // Each write is a parameterization, and is judged whole: T must never exceed n × M.
+            // Each write is a parameterization, which is judged whole: T must never exceed n × M. And
+            // without class 2 and scaling neither is in force, nor read back.
             let total = goal.number(TOTAL_RESOLUTION).unwrap_or_default();
             let steps = before.number(STEPS_PER_TURN).unwrap_or_default();
             let turns = i64::from(before.nameplate.revolutions.unwrap_or(1));
-            let mut scale = [STEPS_PER_TURN, TOTAL_RESOLUTION];
+            let mut scale = SCALE;
             if total <= steps.saturating_mul(turns) {
                 scale.reverse();
             }
-            [&["direction", "class-2"], &scale[..], &["scaling"]].concat()
+            [&["direction", "class-2", "scaling"], &scale[..]].concat()
         }
     };
-    first.retain(|name| goal.setting(name).is_some());
-    let mut order: Vec<&str> = Vec::new();
-    for setting in &goal.settings {
-        if let Some(place) = first.iter().position(|name| *name == setting.name) {
-            order.insert(place.min(order.len()), &setting.name);
-        }
-    }
-    order.sort_by_key(|name| first.iter().position(|first| first == name));
-    let rest = goal.settings.iter().map(|setting| setting.name.as_str());
-    order.extend(rest.filter(|name| !first.contains(name)).collect::<Vec<_>>());
-    order
+    let names = || goal.settings.iter().map(|setting| setting.name.as_str());
+    let of_first = first.iter().filter_map(|first| names().find(|name| name == first));
+    of_first.chain(names().filter(|name| !first.contains(name))).collect()
 }
 
 fn positioning(
@@ -198,13 +195,7 @@ fn positioning(
         {
             return Ok(Positioning::Nothing);
         }
-        if before.position.at_rest == Some(false) {
-            return Err(fit::refused(
-                session,
-                "its shaft turns, and a preset is for a machine that stands".to_owned(),
-                "stop the machine and try again".to_owned(),
-            ));
-        }
+        must_stand(before, session)?;
         if goal.number("class-2") == Some(0) {
             return Err(fit::refused(
                 session,
@@ -229,6 +220,7 @@ fn positioning(
             if keeps(offset) {
                 return Ok(Positioning::Nothing);
             }
+            must_stand(before, session)?;
             fit::warn_of_turns(goal, before, warnings);
             return Ok(Positioning::Offset { offset });
         }
@@ -284,6 +276,17 @@ fn positioning(
         }
     }
     Ok(found)
+}
+
+fn must_stand(before: &Passport, session: &dyn Session) -> Result<(), Trouble> {
+    if before.position.at_rest != Some(false) {
+        return Ok(());
+    }
+    Err(fit::refused(
+        session,
+        "its shaft turns, and a preset is for a machine that stands".to_owned(),
+        "stop the machine and try again".to_owned(),
+    ))
 }
 
 impl Plan {

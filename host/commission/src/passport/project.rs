@@ -7,8 +7,7 @@ use codewheel_device::profibus::configuration;
 use codewheel_device::profibus::parameters::{self, Field};
 use serde::Serialize;
 
-use super::{Passport, Setting};
-use crate::Reading;
+use super::Passport;
 
 /// What the project of the master must say, since no device keeps it.
 ///
@@ -77,13 +76,17 @@ impl Project {
         words
     }
 
-    /// The user parameters that these settings are; `None` where one of them is missing.
-    pub(super) fn user_parameters_of(settings: &[Setting]) -> Option<Vec<u8>> {
+    /// The user parameters that the settings of `passport` are; `None` where one of them is missing.
+    fn user_parameters_of(passport: &Passport) -> Option<Vec<u8>> {
         let mut user = vec![0; parameters::USER_OCTETS];
         for row in parameters::ROWS {
-            let setting = settings.iter().find(|setting| setting.name == row.key)?;
-            let Reading::Number(value) = setting.reading else { return None };
-            row.write(u32::try_from(value).ok()?, &mut user);
+            match passport.number(row.key) {
+                Some(value) => row.write(u32::try_from(value).ok()?, &mut user),
+                // Commissioning diagnostics have no effect, and without scaling n and T have none.
+                None if row.class == 1 && row.key != "commissioning-diagnostics" => return None,
+                None if row.class == 2 && !passport.is_unscaled() => return None,
+                None => {}
+            }
         }
         Some(user)
     }
@@ -154,7 +157,7 @@ impl Passport {
             self.project.data_sheet = Some(sheet.to_owned());
         }
         if self.bus == Bus::Profibus && self.project.user_parameters.is_none() {
-            self.project.user_parameters = Project::user_parameters_of(&self.settings);
+            self.project.user_parameters = Project::user_parameters_of(self);
         }
     }
 }

@@ -25,6 +25,14 @@ const REVOLUTIONS: &str = "revolutions";
 /// # Errors
 /// What the session meets with. A device that tells no position gives a passport without one.
 pub fn take(session: &mut dyn Session, circumstances: &Circumstances) -> Result<Passport, Trouble> {
+    take_with_values(session, circumstances).map(|(passport, _)| passport)
+}
+
+/// The same, with all that it told: the ranges of the settings are there.
+pub(super) fn take_with_values(
+    session: &mut dyn Session,
+    circumstances: &Circumstances,
+) -> Result<(Passport, Vec<Value>), Trouble> {
     let identity = session.identify()?;
     let values = session.values()?;
     let total = number(&values, TOTAL_RESOLUTION).and_then(|total| u32::try_from(total).ok());
@@ -58,7 +66,7 @@ pub fn take(session: &mut dyn Session, circumstances: &Circumstances) -> Result<
     };
     passport.project.configuration = configuration(&values);
     passport.derive_project();
-    Ok(passport)
+    Ok((passport, values))
 }
 
 /// What a device calls its number of revolutions, as a number.

@@ -4,7 +4,8 @@ use codewheel_station::rs485::{BaudRate, Node};
 use codewheel_station::{Duration, Instant};
 
 use super::{
-    Acyclic, Answer, Console, HIGHEST_ADDRESS, Master, MasterSettings, ScanSettings, patient_slot,
+    Acyclic, Answer, Console, HIGHEST_ADDRESS, HeardMaster, Master, MasterSettings, ScanSettings,
+    patient_slot,
 };
 use crate::{Kind, Progress, Seat, Trouble};
 
@@ -24,6 +25,8 @@ const PATIENCE_BITS: u32 = 50_000;
 const WATCHDOG: Duration = Duration::from_secs(5);
 /// How many stations are asked with one token by a master alone.
 const IN_A_ROW: u8 = 8;
+/// A token on the line.
+const TOKEN_CHARACTERS: u32 = 3;
 /// How often progress is told while nothing happens.
 const STEP: Duration = Duration::from_millis(100);
 
@@ -32,6 +35,8 @@ const STEP: Duration = Duration::from_millis(100);
 pub(super) struct Conversation<S> {
     pub(super) seat: S,
     pub(super) settings: ScanSettings,
+    /// When it began to listen. What was heard before may be over.
+    pub(super) since: Instant,
     notices: Vec<String>,
 }
 
@@ -41,8 +46,8 @@ fn listening(rate: BaudRate) -> Duration {
 }
 
 impl<S: Seat<Station = Console>> Conversation<S> {
-    pub(super) const fn new(seat: S, settings: ScanSettings) -> Self {
-        Self { seat, settings, notices: Vec::new() }
+    pub(super) fn new(seat: S, settings: ScanSettings) -> Self {
+        Self { since: seat.now(), seat, settings, notices: Vec::new() }
     }
 
     pub(super) fn console(&mut self) -> &mut Console {
@@ -106,11 +111,13 @@ impl<S: Seat<Station = Console>> Conversation<S> {
         }
     }
 
-    /// Other masters that were heard, by address.
+    /// Other masters that were heard since it listens, by address.
     pub(super) fn masters(&mut self) -> Vec<u8> {
-        let own = self.settings.address;
-        let masters = self.console().overheard().masters().map(|(address, _)| address);
-        masters.filter(|address| *address != own).collect()
+        let (own, since) = (self.settings.address, self.since);
+        let masters = self.console().overheard().masters();
+        let is_there =
+            |(address, master): &(u8, &HeardMaster)| *address != own && master.at >= since;
+        masters.filter(is_there).map(|(address, _)| address).collect()
     }
 
     /// Why the own address cannot be used, after listening.
@@ -203,11 +210,14 @@ impl<S: Seat<Station = Console>> Conversation<S> {
         Ok(answer.unwrap_or(Answer::Silence))
     }
 
-    /// Hands the token on and falls silent. Whoever is still in the way after a while is left so.
+    /// Hands the token on and falls silent, once the token is out.
     pub(super) fn leave(&mut self) -> Result<(), Trouble> {
         let until = self.patience();
         self.console().leave();
         self.wait(until, |console, _| console.master().is_none().then_some(()))?;
+        let out = self.rate().characters(TOKEN_CHARACTERS);
+        let until = self.seat.now() + out;
+        self.wait(until, |_, _| None::<()>)?;
         Ok(())
     }
 }

@@ -27,11 +27,13 @@ impl<S: Seat<Station = Console>> Eavesdropper<S> {
         if let Some(trouble) = conversation.gibberish_trouble(&tried) {
             return Err(trouble);
         }
-        let heard = conversation.console().overheard();
-        if heard.slave(address).is_some_and(|slave| slave.exchange.is_some()) {
-            return Ok(Self { conversation, address, last: Instant::ZERO });
+        let since = conversation.since;
+        let masters = conversation.masters();
+        let slave = conversation.console().overheard().slave(address);
+        let exchange = slave.and_then(|slave| slave.exchange.as_ref());
+        if exchange.is_some_and(|exchange| exchange.at >= since) {
+            return Ok(Self { conversation, address, last: since });
         }
-        let masters: Vec<u8> = heard.masters().map(|(address, _)| address).collect();
         let came = match masters.as_slice() {
             [] => "no master is on the bus".to_owned(),
             [one] => format!("master {one} is on the bus and exchanges no data with it"),

@@ -4,7 +4,7 @@ mod preset;
 mod session;
 
 use codewheel_device::profibus::configuration;
-use codewheel_device::profibus::parameters::Row;
+use codewheel_device::profibus::parameters::{Row, TOTAL_RESOLUTION};
 use codewheel_encoder::Model;
 use codewheel_station::Instant;
 
@@ -162,9 +162,15 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         }
     }
 
-    /// Asks a slave for its diagnosis that this master does not serve.
+    /// Asks a slave for its diagnosis that this master does not serve. On a PC that is busy an answer
+    /// may come after its slot, so silence is believed only after a while.
     fn ask_diagnosis(&mut self, tried: &str) -> Result<Diagnosis, Trouble> {
-        match self.conversation.ask(tried, self.address, Acyclic::Diagnosis)? {
+        let until = self.conversation.patience();
+        let mut answer = self.conversation.ask(tried, self.address, Acyclic::Diagnosis)?;
+        while answer == Answer::Silence && self.conversation.seat.now() < until {
+            answer = self.conversation.ask(tried, self.address, Acyclic::Diagnosis)?;
+        }
+        match answer {
             Answer::Diagnosis(diagnosis) => Ok(diagnosis),
             Answer::Silence => Err(self.silence(tried)),
             _ => Err(Trouble::new(
@@ -330,19 +336,27 @@ fn told(reading: &Reading) -> String {
     }
 }
 
-/// What a refused parameter takes, and how a GSD file writes what was given.
+/// What a refused parameter takes, how a GSD file writes what was given, and what else is in its way.
 fn refused_remedy(served: &Served, row: &Row, value: u32) -> String {
-    let smallest = *(row.range)(served.model).start();
-    let largest = served.chosen.largest(row, served.model);
-    let takes = format!("{} takes {smallest} to {largest}", row.key);
-    match row.words(served.model) {
-        Some([high, low]) => format!(
-            "{takes} beside the other parameters; a GSD file writes {value} as {} {}, {} {}",
+    let Served { chosen, model, .. } = served;
+    let smallest = *(row.range)(*model).start();
+    let mut remedy = format!("{} takes {smallest} to {}", row.key, chosen.largest(row, *model));
+    if let Some([high, low]) = row.words(*model) {
+        remedy.push_str(&format!(
+            "; a GSD file writes {value} as {} {}, {} {}",
             high.name,
             value >> 16,
             low.name,
             value & 0xFFFF
-        ),
-        None => takes,
+        ));
     }
+    let (total, largest) =
+        (chosen.value(&TOTAL_RESOLUTION), chosen.largest(&TOTAL_RESOLUTION, *model));
+    if row.key != TOTAL_RESOLUTION.key && total > largest {
+        remedy.push_str(&format!(
+            "; beside it {} {total} is too much: write that first, at most {largest}",
+            TOTAL_RESOLUTION.key
+        ));
+    }
+    remedy
 }

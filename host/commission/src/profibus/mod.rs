@@ -1,4 +1,17 @@
-//! A PROFIBUS-DP master of class 1 on any line.
+//! A PROFIBUS-DP master of class 1 on any line, and what people do with it.
+//!
+//! | subject | |
+//! |---|---|
+//! | [`Console`] | the station behind all of this: ears, and a master once it is told to speak |
+//! | [`Overheard`] | what the ears heard: who asks whom, for what, and what comes back |
+//! | [`scan`] | who is on the bus |
+//! | [`Encoder`] | a [`Session`](crate::Session) with one encoder |
+//! | [`Eavesdropper`] | the positions of an encoder that another master asks, without a word |
+//!
+//! All of them listen first. Where a master is heard, they send nothing unless they are told to join its
+//! ring; an encoder that belongs to it is looked at and not touched.
+//!
+//! # The master
 //!
 //! [`Master`] is a [`Station`](codewheel_station::Station) and a
 //! [`rs485::Node`](codewheel_station::rs485::Node) around profirust's active station and DP master.
@@ -15,7 +28,7 @@
 //! | [`Master::take_event`] | what happened |
 //! | [`Master::cycle_times`], [`Master::counters`] | how the bus does |
 //!
-//! # What stands between profirust and the line
+//! ## What stands between profirust and the line
 //! profirust is driven by a clock of its own (32 ticks a bit, so that no rounding shortens a pause),
 //! sees whole telegrams only, and of these only such as it can deal with. It trusts its slaves
 //! further than a line can be trusted:

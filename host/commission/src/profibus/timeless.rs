@@ -92,3 +92,76 @@ impl<N: Node> Node for Timeless<N> {
         self.station.baud_rate()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use codewheel_station::Duration;
+
+    /// Says a token at once, and notes when it heard what.
+    #[derive(Debug, Default)]
+    struct Toy {
+        said: bool,
+        heard: Vec<(Instant, Vec<u8>)>,
+    }
+
+    impl Station for Toy {
+        type Input<'a> = Input<'a>;
+        type Output = Transmission;
+
+        fn handle(&mut self, now: Instant, input: Input<'_>) {
+            if let Input::Octets(octets) = input {
+                self.heard.push((now, octets.to_vec()));
+            }
+        }
+
+        fn advance(&mut self, _: Instant) {}
+
+        fn transmit(&mut self, _: Instant) -> Option<Transmission> {
+            let is_first = !std::mem::replace(&mut self.said, true);
+            is_first.then(|| Transmission::new(&[0xDC, 2, 2])).flatten()
+        }
+
+        fn deadline(&self) -> Option<Instant> {
+            None
+        }
+    }
+
+    impl Node for Toy {
+        fn baud_rate(&self) -> BaudRate {
+            BaudRate::Kbit500
+        }
+    }
+
+    /// Three characters at 500k last 66 µs.
+    #[test]
+    fn what_comes_while_it_speaks_is_heard_at_the_end_of_its_telegram() {
+        let at = |micros| Instant::ZERO + Duration::from_micros(micros);
+        let mut line = Timeless::new(Toy::default());
+        assert!(line.transmit(at(0)).is_some());
+        assert_eq!((line.speaks_until(), line.deadline()), (at(66), None));
+        line.handle(at(10), Input::Octets(&[0x10, 0x07]));
+        line.handle(at(20), Input::Octets(&[0x02]));
+        line.advance(at(65));
+        assert!(line.station().heard.is_empty());
+        assert_eq!(line.deadline(), Some(at(66)));
+        line.advance(at(66));
+        line.handle(at(70), Input::Octets(&[0x00]));
+        assert_eq!(line.station().heard, [(at(66), vec![0x10, 7, 2]), (at(70), vec![0])]);
+        assert_eq!(line.deadline(), None);
+    }
+
+    #[test]
+    fn a_peer_that_never_stops_fills_no_more_than_its_room() {
+        let mut line = Timeless::new(Toy::default());
+        assert!(line.transmit(Instant::ZERO).is_some());
+        for _ in 0..100 {
+            line.handle(Instant::ZERO, Input::Octets(&[0x55; 100]));
+        }
+        line.advance(line.speaks_until());
+        assert_eq!(
+            line.station().heard.iter().map(|(_, octets)| octets.len()).sum::<usize>(),
+            EARLY
+        );
+    }
+}

@@ -179,7 +179,9 @@ impl Slave {
         let mut passport = blank(Bus::Profibus, address, bit_rate, self.last, program);
         passport.nameplate = self.plate();
         for row in parameters::ROWS {
-            if let Some(value) = self.parameter(row) {
+            // Without class 2 and scaling, n and T are sent in vain.
+            let counts = row.class == 1 || !passport.is_unscaled();
+            if let Some(value) = self.parameter(row).filter(|_| counts) {
                 passport.settings.push(setting(row, value));
             }
         }
@@ -197,7 +199,9 @@ impl Slave {
             ("identity.singleturn-resolution", plate.singleturn_resolution.is_some()),
             ("identity.firmware", plate.firmware.is_some()),
         ]);
-        let unknown = parameters::ROWS.iter().filter(|row| passport.setting(row.key).is_none());
+        let unknown = parameters::ROWS.iter().filter(|row| {
+            passport.setting(row.key).is_none() && (row.class == 1 || !passport.is_unscaled())
+        });
         missing.extend(unknown.map(|row| format!("settings.{}", row.key)));
         missing.extend(absent([
             ("position.offset", passport.position.offset.is_some()),

@@ -1,6 +1,7 @@
 //! Whether an encoder can give the positions of a passport.
 
 use codewheel_device::product::Bus;
+use codewheel_device::profibus::parameters;
 
 use super::super::take::{STEPS_PER_TURN, TOTAL_RESOLUTION, find};
 use super::super::{Passport, Subject, compare};
@@ -26,6 +27,10 @@ pub(super) fn check(
     for setting in &goal.settings {
         let name = &setting.name;
         let Some(value) = find(values, name) else {
+            // In class 1 they are there all the same, and cannot be read.
+            if goal.bus == Bus::Profibus && parameters::Row::find(name).is_some() {
+                continue;
+            }
             return Err(refused(
                 session,
                 format!("it has no {name}"),

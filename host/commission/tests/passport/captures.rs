@@ -1,0 +1,1 @@
+//! Passports from recorded traffic.
