@@ -18,7 +18,7 @@ const WARNING_FLAG: u8 = 1 << 1;
 /// Hears what an encoder produces for its own master, and sends nothing.
 ///
 /// Four octets are taken for a position, five for a position and flags: assemblies 1 and 2 of our
-/// encoders (AMG manual §6.1). Nobody on the bus says so; see that the device is one of ours.
+/// encoders (AMG manual §6). Nobody on the bus says so; see that the device is one of ours.
 #[derive(Debug)]
 pub struct Eavesdropper<S> {
     dialogue: Dialogue<S>,

@@ -24,6 +24,8 @@ const POSITION_AND_FLAGS: Path = Path { class: class::ASSEMBLY, instance: 2, att
 pub(super) struct Watch {
     /// When the newest position came that was given.
     seen: Option<Instant>,
+    /// Positions up to this moment may be from before a change.
+    changed: Option<Instant>,
     /// The flags of an explicit message, alarm and warning, and when they came.
     flags: Option<(Instant, Option<bool>, Option<bool>)>,
 }
@@ -40,7 +42,7 @@ impl Watch {
     ) -> Result<Self, Trouble> {
         dialogue.release(tried, mac)?;
         dialogue.allocate(tried, SlaveSettings::poll(mac))?;
-        Ok(Self { seen: None, flags: None })
+        Ok(Self { seen: None, changed: None, flags: None })
     }
 
     /// Goes back to the explicit connection alone.
@@ -53,6 +55,11 @@ impl Watch {
         dialogue.allocate(tried, SlaveSettings::explicit(mac))
     }
 
+    /// Something was changed until `now`: positions that came before are not given any more.
+    pub(super) const fn change(&mut self, now: Instant) {
+        self.changed = Some(now);
+    }
+
     /// The next position.
     pub(super) fn sample<S: Seat<Station = Console>>(
         &mut self,
@@ -60,10 +67,10 @@ impl Watch {
         tried: &str,
         mac: MacId,
     ) -> Result<Sample, Trouble> {
-        let seen = self.seen;
+        let (seen, changed) = (self.seen, self.changed);
         let newer = dialogue.wait(tried, PATIENCE, |console, _| {
             let slave = console.scanner()?.slave(mac)?;
-            let at = slave.input_at.filter(|at| Some(*at) > seen)?;
+            let at = slave.input_at.filter(|at| Some(*at) > seen && Some(*at) > changed)?;
             Some((at, slave.input.to_vec()))
         })?;
         let Some((at, octets)) = newer else { return Err(dialogue.no_answer(tried, mac)) };

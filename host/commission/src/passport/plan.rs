@@ -156,7 +156,9 @@ fn order<'a>(goal: &'a Passport, before: &Passport) -> Vec<&'a str> {
             // Each write is a parameterization, which is judged whole: T must never exceed n × M. And
             // without class 2 and scaling neither is in force, nor read back.
             let total = goal.number(TOTAL_RESOLUTION).unwrap_or_default();
-            let steps = before.number(STEPS_PER_TURN).unwrap_or_default();
+            // In class 1 it counts with the whole disc.
+            let disc = before.nameplate.singleturn_resolution.map(i64::from);
+            let steps = before.number(STEPS_PER_TURN).or(disc).unwrap_or_default();
             let turns = i64::from(before.nameplate.revolutions.unwrap_or(1));
             let mut scale = SCALE;
             if total <= steps.saturating_mul(turns) {

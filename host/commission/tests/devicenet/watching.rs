@@ -64,6 +64,23 @@ fn flags_come_with_the_position_where_the_device_has_kept_that() {
 }
 
 #[test]
+fn no_position_from_before_a_change_is_given_after_it() {
+    let mut seat = turning("still angle=500");
+    let mut session = seat.open(5).unwrap();
+    session.sample().unwrap();
+    for position in 0..20 {
+        session.preset(position).unwrap();
+        assert_eq!(session.sample().unwrap().position, position);
+        // Polls go on meanwhile, and what they bring last is from before the reset.
+        for _ in 0..5 {
+            session.identify().unwrap();
+        }
+        session.reset().unwrap();
+        assert_eq!(session.sample().unwrap().position, 500);
+    }
+}
+
+#[test]
 fn values_are_read_and_written_while_it_is_watched() {
     let mut seat = turning("still angle=500");
     let mut session = seat.open(5).unwrap();

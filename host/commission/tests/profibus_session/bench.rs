@@ -7,7 +7,8 @@ use codewheel_commission::profibus::{
 use codewheel_commission::{Found, Progress, Seat, Survey, Trouble};
 use codewheel_device::profibus::{Factory, IDENT_NUMBER, Switches};
 use codewheel_device::{Product, ProfibusEncoder};
-use codewheel_encoder::Start;
+use codewheel_encoder::ssi::LineFault;
+use codewheel_encoder::{Reading, Sample, Sensor, Start};
 use codewheel_link::{LinkError, Notice};
 use codewheel_profibus::{Baud, Timing};
 use codewheel_sim::Either;
@@ -22,7 +23,23 @@ pub(crate) const RATE: BaudRate = BaudRate::Mbit1_5;
 /// The master of the plant.
 pub(crate) const PLC: u8 = 2;
 
-type Device = ProfibusEncoder<Shaft>;
+type Device = ProfibusEncoder<Disc>;
+
+/// A shaft, or an SSI line that brings nothing.
+pub(crate) struct Disc(Option<Shaft>);
+
+impl Sensor for Disc {
+    fn sample(&mut self, now: Instant) -> Sample {
+        match &mut self.0 {
+            Some(shaft) => shaft.sample(now),
+            None => Sample { reading: Reading::Failed(LineFault::StuckHigh), ..Sample::default() },
+        }
+    }
+
+    fn changes_at(&self, now: Instant) -> Option<Instant> {
+        self.0.as_ref()?.changes_at(now)
+    }
+}
 type Station = Either<Either<Console, Master>, Either<Device, Stranger>>;
 
 /// A console on a wire.
@@ -78,15 +95,25 @@ impl Bench {
         self
     }
 
+    /// With a converter at whose SSI line nothing is.
+    pub(crate) fn with_silent_ssi(mut self, address: u8, model: &str) -> Self {
+        self.power_up(address, model, self.rate(), Disc(None));
+        self
+    }
+
     pub(crate) fn attach(&mut self, address: u8, model: &str, rate: BaudRate) {
-        let product = Product::find(model).expect("a model");
-        let geometry = product.encoder.geometry;
+        let geometry = Product::find(model).expect("a model").encoder.geometry;
         let shaft = Shaft::parse(
             "still angle=90deg",
             geometry.singleturn_resolution(),
             geometry.revolutions(),
         )
         .expect("a shaft");
+        self.power_up(address, model, rate, Disc(Some(shaft)));
+    }
+
+    fn power_up(&mut self, address: u8, model: &str, rate: BaudRate, disc: Disc) {
+        let product = Product::find(model).expect("a model");
         let factory = Factory {
             model: product.encoder,
             serial: 1,
@@ -96,7 +123,7 @@ impl Bench {
         let start = Start::Fresh { interrupted: false };
         let now = self.wire.now();
         let switches = Switches::set_to(address);
-        let device = Device::power_up(now, product, factory, switches, &start, shaft);
+        let device = Device::power_up(now, product, factory, switches, &start, disc);
         let attachment = Attachment { hearing: Hearing::Telegrams, ..Attachment::default() };
         let station = Either::Right(Either::Left(device));
         let id = self.wire.attach(format!("encoder {address}"), station, attachment);

@@ -51,3 +51,16 @@ fn two_octets_carry_presets_of_15_bits() {
     let trouble = session.preset(0x8000).unwrap_err();
     assert!(trouble.remedy.contains("0 to 32767, which is all"), "{trouble}");
 }
+
+#[test]
+fn a_preset_that_the_encoder_refuses_is_told_with_its_alarm() {
+    let mut bench = Bench::new().with_silent_ssi(7, "heag162-p29");
+    let mut session = bench.open(7, &alone()).unwrap();
+    let trouble = session.preset(5).unwrap_err();
+    assert_eq!(trouble.kind, Kind::Refused, "{trouble}");
+    assert_eq!(
+        trouble.came,
+        "it did not take it: the position is 0, the offset as before, and its alarm is on"
+    );
+    assert!(trouble.remedy.contains("SSI line brings no position"), "{trouble}");
+}

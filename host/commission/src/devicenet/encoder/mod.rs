@@ -18,7 +18,7 @@ use super::watch::{self, Watch};
 use super::{LISTEN_TIME, OWN_MAC, identity, survey, troubles, values};
 use crate::{Identity, Kind, Name, Reading, Sample, Seat, Session, Trouble, Value};
 
-/// How long a Save may take: a device writes its memory for up to five seconds (AMG manual §8.3).
+/// How long a Save may take: our devices give their memory five seconds (decision).
 const SAVE_TIME: Duration = Duration::from_secs(6);
 /// How long Restore and Reset may take.
 const SERVICE_TIME: Duration = Duration::from_secs(2);
@@ -115,6 +115,14 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         Ok(())
     }
 
+    /// What is sampled from now on is from after a change.
+    fn note_change(&mut self) {
+        let now = self.dialogue.now();
+        if let Some(watch) = &mut self.watch {
+            watch.change(now);
+        }
+    }
+
     /// Save, Restore and Reset: of class 2Fh on ours, else of the Parameter object for all its
     /// parameters.
     fn memory_service(
@@ -125,6 +133,7 @@ impl<S: Seat<Station = Console>> Encoder<S> {
     ) -> Result<(), Trouble> {
         let (class, instance) = if self.is_ours() { (ENCODER_POSITION, 1) } else { (PARAMETER, 0) };
         let done = self.serve(tried, &[service.0, class, instance], patience)?;
+        self.note_change();
         done.map(|_| ()).map_err(|error| troubles::refused(tried, error))
     }
 
@@ -237,6 +246,7 @@ impl<S: Seat<Station = Console>> Session for Encoder<S> {
                 done.map_err(|error| troubles::refused(&tried, error))?;
             }
         }
+        self.note_change();
         self.target_value(&tried, target)
     }
 
@@ -247,6 +257,7 @@ impl<S: Seat<Station = Console>> Session for Encoder<S> {
         if let Some(row) = Row::find(values::PRESET) {
             self.write_row(&tried, row, &Reading::Number(position.into()))?;
         }
+        self.note_change();
         watch::ask(&mut self.dialogue, &tried, self.mac)
     }
 

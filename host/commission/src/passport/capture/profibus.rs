@@ -78,8 +78,9 @@ impl ProfibusTraces {
 impl Slave {
     fn parameterized(&mut self, data: &[u8]) {
         let &[status, _, _, _, high, low, _, ref user @ ..] = data else { return };
-        self.ident = Some(u16::from_be_bytes([high, low]));
+        // A slave that is let go looks at nothing else in it.
         if status & LOCK != 0 && status & UNLOCK == 0 {
+            self.ident = Some(u16::from_be_bytes([high, low]));
             self.sent = Some(user.to_vec());
         }
     }

@@ -45,20 +45,19 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         let after = self.read_diagnosis(&tried)?;
         let after = Told { diagnosis: &after };
         let sample = self.sample()?;
-        if after.alarm() == Some(true) && before.alarm() != Some(true) {
-            return Err(out_of_range(tried, &served, largest));
-        }
         let is_taken =
             sample.position == preset || before.number("offset") != after.number("offset");
         if is_taken {
             return Ok(sample);
         }
-        Err(Trouble::new(
-            Kind::Refused,
-            tried,
-            format!("it took no notice: the position is {}, the offset as before", sample.position),
-            "look at its alarms: a converter without SSI words has no position to preset",
-        ))
+        let alarm = if after.alarm() == Some(true) { ", and its alarm is on" } else { "" };
+        let came = format!(
+            "it did not take it: the position is {}, the offset as before{alarm}",
+            sample.position
+        );
+        let remedy = "a converter takes none while its SSI line brings no position; a refused one \
+                      lets the lamp flash red, 5 Hz, until another is good";
+        Err(Trouble::new(Kind::Refused, tried, came, remedy))
     }
 
     /// Gives the slave other outputs, and waits until it has seen them.
@@ -121,8 +120,5 @@ fn out_of_range(tried: String, served: &Served, largest: i64) -> Trouble {
     if i64::from(largest_in(served.configuration)) == largest {
         remedy.push_str(", which is all that its outputs can say: F1h has more");
     }
-    remedy.push_str(
-        "; one that was sent all the same lets its lamp flash red, 5 Hz, until a good one comes",
-    );
     Trouble::new(Kind::Refused, tried, came, remedy)
 }
