@@ -367,7 +367,7 @@ class Visit(Generic[Message]):
 
     @property
     def silence(self) -> float:
-        """Seconds from the opened channel to the first that was sent; infinite where nothing was."""
+        """Seconds from the opened channel to what was sent first; infinite where nothing was."""
         sent = self.sent
         if not sent or sent[0].guest is None:
             return float("inf")

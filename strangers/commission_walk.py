@@ -117,7 +117,8 @@ class Walk(Steps, Generic[Message]):
         entries = self.conversation()[begin:][-SHOWN_ENTRIES:]
         for entry in entries:
             whose = "node   " if entry.guest is None else f"guest {entry.guest.number}"
-            print(f"       {whose} {1000 * (entry.at - entries[-1].at):8.1f} ms  {entry}", flush=True)
+            before = 1000 * (entry.at - entries[-1].at)
+            print(f"       {whose} {before:8.1f} ms  {entry}", flush=True)
 
     @property
     def medium(self) -> Medium[Message]:

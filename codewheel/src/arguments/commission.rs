@@ -82,7 +82,7 @@ Examples:
   codewheel scan --bus rs485:/dev/ttyUSB0 --join
   codewheel scan --bus socketcan:can0 --json | jq 'select(.owner == null).address'
 
-Exit codes: 0 somebody is there, 2 usage, 3 the bus cannot be used, 5 nobody is heard.")]
+Exit codes: 0 somebody is there, 2 usage, 3 nobody is, or the bus cannot be used, 5 time-out.")]
 pub(crate) struct ScanArguments {
     #[command(flatten)]
     pub(crate) bus: BusArguments,

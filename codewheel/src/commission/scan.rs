@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use codewheel_commission::{Found, Identity, Owner, Role, Survey};
+use codewheel_commission::{Found, Identity, Kind, Owner, Role, Survey, Trouble};
 use comfy_table::{Table, presets};
 use serde::Serialize;
 
@@ -41,6 +41,13 @@ pub(super) fn tell(
     arguments: &ScanArguments,
     chatter: Chatter,
 ) -> Result<(), Failure> {
+    if survey.nodes.is_empty() {
+        let came = match survey.remarks.as_slice() {
+            [] => "nobody is there".to_owned(),
+            remarks => remarks.join("; "),
+        };
+        return Err(Trouble::new(Kind::Bus, "find anybody on the bus", came, "").into());
+    }
     let mut out = std::io::stdout().lock();
     if arguments.format.json {
         for node in &survey.nodes {
@@ -65,9 +72,7 @@ pub(super) fn tell(
         }
         return Ok(());
     }
-    if !survey.nodes.is_empty() {
-        writeln!(out, "{}", table(&survey.nodes))?;
-    }
+    writeln!(out, "{}", table(&survey.nodes))?;
     if chatter > Chatter::Quiet {
         survey.remarks.iter().for_each(|remark| eprintln!("codewheel: {remark}"));
     }
