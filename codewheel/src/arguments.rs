@@ -14,11 +14,12 @@ use self::commission::{
     PassportArguments, PresetArguments, RESET_EXAMPLES, RESTORE_EXAMPLES, SAVE_EXAMPLES,
     ScanArguments, ServiceArguments, SetArguments, WatchArguments,
 };
+use crate::page::PageArguments;
 
 /// An absolute rotary encoder made of software.
 ///
 /// Without a verb it runs the demo: a virtual DeviceNet at 500k and a virtual PROFIBUS at 1.5M with
-/// three encoders each, polled by masters, shown in a live table until Ctrl-C.
+/// three encoders each, polled by masters, shown in a live table and on a web page until Ctrl-C.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -28,6 +29,9 @@ use self::commission::{
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) verb: Option<Verb>,
+
+    #[command(flatten)]
+    pub(crate) page: PageArguments,
 
     /// Say nothing on stderr but errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]
@@ -98,8 +102,9 @@ pub(crate) enum Verb {
 
 /// Run a plant: buses, devices, shafts, memories, faults and masters from one TOML file.
 ///
-/// On a terminal it shows a live table, elsewhere a line for each device and second. It ends with
-/// Ctrl-C or a termination, after the memories have taken what they are still to take.
+/// On a terminal it shows a live table, elsewhere a line for each device and second; and all of it
+/// on a web page, where the shafts can be turned. It ends with Ctrl-C or a termination, after the
+/// memories have taken what they are still to take.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -107,6 +112,7 @@ Examples:
   codewheel run examples/faults.toml --for 16s
   codewheel run examples/demo.toml --for 10s --record demo.pcapng
   codewheel run plant.toml --json | jq 'select(.lamp == \"red\")'
+  codewheel run plant.toml --listen 0.0.0.0:8080 --token \"$(openssl rand -hex 16)\"
   codewheel run plant.toml --print-config > complete.toml")]
 pub(crate) struct RunArguments {
     /// The plant file; relative paths in it are meant from its folder
@@ -128,6 +134,9 @@ pub(crate) struct RunArguments {
     /// where all buses are DeviceNet
     #[arg(long, value_name = "FILE", conflicts_with = "print_config")]
     pub(crate) record: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) page: PageArguments,
 }
 
 /// Play one encoder on a bus until Ctrl-C.

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use codewheel_capture::{ReadError, WriteError};
 use codewheel_commission::passport::FileError;
 use codewheel_commission::{Kind, Trouble};
+use codewheel_dashboard::StartError as PageError;
 use codewheel_link::LinkError;
 use codewheel_plant::{MemoryError, PlantError, RecordError, StartError};
 use codewheel_sim::shaft::ShaftError;
@@ -23,6 +24,8 @@ pub(crate) enum Failure {
     Plant(#[from] PlantError),
     #[error(transparent)]
     Start(#[from] StartError),
+    #[error(transparent)]
+    Page(#[from] PageError),
     #[error(transparent)]
     Link(#[from] LinkError),
     #[error("cannot keep {}: {reason}; check that the folder is there and may be written", .path.display())]
@@ -103,6 +106,7 @@ impl Failure {
             | Self::Passport { .. }
             | Self::Shaft(_)
             | Self::Plant(PlantError::Wrong(_))
+            | Self::Page(PageError::NeedsToken(_))
             | Self::Start(
                 StartError::Memory(MemoryError::AnotherProduct { .. })
                 | StartError::Master(_)
@@ -112,6 +116,7 @@ impl Failure {
             | Self::Record(RecordError { reason: WriteError::Format(_), .. }) => 2,
             Self::Plant(PlantError::Read { .. })
             | Self::Start(_)
+            | Self::Page(_)
             | Self::Link(_)
             | Self::File { .. }
             | Self::Read { .. }

@@ -12,6 +12,7 @@ mod files;
 mod hilo;
 mod man;
 mod models;
+mod page;
 mod rates;
 mod record;
 mod replay;
@@ -32,6 +33,11 @@ use crate::failure::Failure;
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let chatter = arguments.chatter();
+    if let (Some(_), Some(option)) = (&arguments.verb, arguments.page.given()) {
+        return end(Err(Failure::Usage(format!(
+            "{option} without a verb is for the demo: write it behind `run`"
+        ))));
+    }
     let result = match arguments.verb {
         Some(Verb::Doctor(doctor)) => return end(doctor::run(&doctor)),
         Some(Verb::Replay(replay)) => return end(replay::run(&replay, chatter)),
@@ -48,7 +54,7 @@ fn main() -> ExitCode {
         Some(Verb::Diff(diff)) => return end(commission::diff(&diff, chatter)),
         Some(Verb::Apply(apply)) => return end(commission::apply(&apply, chatter)),
         Some(Verb::Passport(passport)) => return end(commission::passport(&passport)),
-        None => run::demo(chatter),
+        None => run::demo(&arguments.page, chatter),
         Some(Verb::Run(arguments)) => run::run(&arguments, chatter),
         Some(Verb::Schema) => run::schema(),
         Some(Verb::Encoder(encoder)) => encoder::run(&encoder, chatter),

@@ -10,6 +10,7 @@ use codewheel_plant::{BusSnapshot, Plant, Running};
 
 use crate::arguments::{Chatter, RunArguments};
 use crate::failure::Failure;
+use crate::page::{self, PageArguments};
 use crate::record;
 use crate::show::{self, Show};
 use crate::signals::stop_flag;
@@ -28,11 +29,14 @@ pub(crate) fn run(arguments: &RunArguments, chatter: Chatter) -> Result<(), Fail
         return Ok(());
     }
     let lasts = arguments.lasts.map(|time| time.0.into());
-    play(plant, lasts, arguments.json, arguments.record.as_deref(), chatter)
+    let name = arguments.file.display().to_string();
+    let (page, record) = (&arguments.page, arguments.record.as_deref());
+    play(plant, &name, lasts, arguments.json, record, page, chatter)
 }
 
-pub(crate) fn demo(chatter: Chatter) -> Result<(), Failure> {
-    let plant = Plant::parse(DEMO, "examples/demo.toml", Path::new(""))
+pub(crate) fn demo(page: &PageArguments, chatter: Chatter) -> Result<(), Failure> {
+    let name = "examples/demo.toml";
+    let plant = Plant::parse(DEMO, name, Path::new(""))
         .map_err(|complaint| Failure::Plant(complaint.into()))?;
     if chatter > Chatter::Quiet {
         eprintln!(
@@ -40,7 +44,7 @@ pub(crate) fn demo(chatter: Chatter) -> Result<(), Failure> {
              encoders and a master; Ctrl-C ends it, `codewheel --help` shows what else there is"
         );
     }
-    play(plant, None, false, None, chatter)
+    play(plant, name, None, false, None, page, chatter)
 }
 
 /// `codewheel schema`.
@@ -51,12 +55,15 @@ pub(crate) fn schema() -> Result<(), Failure> {
 
 fn play(
     plant: Plant,
+    name: &str,
     lasts: Option<Duration>,
     json: bool,
     record: Option<&Path>,
+    page: &PageArguments,
     chatter: Chatter,
 ) -> Result<(), Failure> {
     let stop = stop_flag(|| {})?;
+    let port = page.port(name)?;
     let mut show = show::choose(json, plant.buses.len());
     let crews: Vec<_> = plant
         .buses
@@ -74,13 +81,16 @@ fn play(
             (running, Some(recording))
         }
     };
+    let running = Arc::new(running);
     if chatter > Chatter::Quiet {
         for ((name, uri), crew) in names.iter().zip(running.uris()).zip(crews) {
             eprintln!("codewheel: {name} on {uri}: {crew}");
         }
     }
+    let page = port.map(|port| page::serve(&running, port, chatter)).transpose()?;
     let until = lasts.and_then(|lasts| Instant::now().checked_add(lasts));
     let shown = watch(&running, show.as_mut(), until, &stop, chatter);
+    drop(page);
     // Whatever became of the output: the memories finish first.
     let (rest, ended) = running.stop();
     drop(show);

@@ -7,6 +7,7 @@ mod demo;
 mod descriptions;
 mod doctor;
 mod encoder;
+mod page;
 #[cfg(unix)]
 mod profibus;
 mod prompt;

@@ -246,7 +246,7 @@ fn whoever_stops_reading_ends_the_program_quietly() {
     running.close_stdout();
     let (status, messages) = running.end();
     assert_eq!(status.code(), Some(0), "{messages}");
-    assert_eq!(messages.lines().count(), 2, "{messages}");
+    assert_eq!(messages.lines().count(), 3, "two buses and the page: {messages}");
 
     let encoder = ["encoder", "amg11-d29", "--bus", "slcan-listen:127.0.0.1:0", "--address", "5"];
     let demo = example("demo.toml");

@@ -37,6 +37,19 @@ pub enum Assume {
     Nothing,
 }
 
+/// What a record says, in its parts.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Caption {
+    /// The address of who said it, where that is known.
+    pub from: Option<u8>,
+    /// The address of whom it was said to, where that is known.
+    pub to: Option<u8>,
+    /// What kind of message it is: `poll response`.
+    pub message: String,
+    /// What it says, as people read it: `position 4096 step`; empty where that is all.
+    pub text: String,
+}
+
 /// Names what the records of a capture say, one line each; also live, as they come.
 ///
 /// It remembers what answers do not repeat: the request of a response, the fragments of a message, the
@@ -65,32 +78,44 @@ impl Decoder {
 
     /// Appends the line of `record`, which was carried by `bus`, with its end of line.
     pub fn decode(&mut self, bus: &Bus, record: &Record<'_>, out: &mut Vec<u8>) {
-        self.go_through(bus, record, out, Listener(None));
+        if let Some(line) = self.line(self.output, bus, record, out, Listener(None)) {
+            line.end(&record.content);
+        }
+    }
+
+    /// What `record` says, in its parts, whatever output was chosen.
+    #[must_use]
+    pub fn caption(&mut self, bus: &Bus, record: &Record<'_>) -> Caption {
+        let mut out = Vec::with_capacity(128);
+        let line = self.line(Output::Text, bus, record, &mut out, Listener(None));
+        line.map(Line::into_caption).unwrap_or_default()
     }
 
     /// Tells `listener` what `record` says, for programs that want the octets and not the names. Records
     /// that say nothing by themselves, such as a request, tell nothing.
     pub fn hear(&mut self, bus: &Bus, record: &Record<'_>, listener: &mut dyn FnMut(Said<'_>)) {
-        let mut line = std::mem::take(&mut self.unread);
-        line.clear();
-        self.go_through(bus, record, &mut line, Listener(Some(listener)));
-        self.unread = line;
+        let mut out = std::mem::take(&mut self.unread);
+        out.clear();
+        self.line(self.output, bus, record, &mut out, Listener(Some(listener)));
+        self.unread = out;
     }
 
-    fn go_through<'o>(
+    /// The line of `record`, but for its end.
+    fn line<'o>(
         &mut self,
+        output: Output,
         bus: &Bus,
         record: &Record<'_>,
         out: &'o mut Vec<u8>,
         listener: Listener<'o>,
-    ) {
+    ) -> Option<Line<'o>> {
         let place = usize::from(record.bus);
         if self.buses.len() <= place {
             self.buses.resize_with(place + 1, State::default);
         }
-        let Some(state) = self.buses.get_mut(place) else { return };
+        let state = self.buses.get_mut(place)?;
         let assume = self.assume;
-        let mut line = Line::begin(out, self.output, bus, record, listener);
+        let mut line = Line::begin(out, output, bus, record, listener);
         match &record.content {
             Content::Frame(frame) => {
                 let known = state.devicenet.get_or_insert_with(|| Box::new(DeviceNet::new(assume)));
@@ -101,6 +126,6 @@ impl Decoder {
                 known.decode(octets, *condition == Condition::Broken, &mut line);
             }
         }
-        line.end(&record.content);
+        Some(line)
     }
 }

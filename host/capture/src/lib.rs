@@ -41,7 +41,7 @@ mod said;
 mod writer;
 
 pub use bus::{Bus, Medium};
-pub use decoder::{Assume, Decoder, Output, Replayed, replay};
+pub use decoder::{Assume, Caption, Decoder, Output, Replayed, replay};
 pub use format::{Format, FormatError};
 pub use framer::Framer;
 pub use reader::{Damage, Place, ReadError, Reader};

@@ -20,7 +20,7 @@ mod faults;
 mod profibus;
 mod ssi;
 
-pub(crate) use faults::fault_of_words;
+pub(crate) use faults::{cannot_suffer, fault_of_words, lever_of_words};
 pub(crate) use profibus::baud_rate;
 pub(crate) use ssi::sensor_of_keys;
 

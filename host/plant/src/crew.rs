@@ -1,13 +1,17 @@
 //! Who is on a bus, whatever the bus is: devices, masters, what is done to them and what they show.
 
+mod commands;
+mod shaft;
+
 use std::collections::BTreeMap;
 
 use codewheel_device::Product;
-use codewheel_station::{Instant, Station};
+use codewheel_station::{Duration, Instant, Station};
 
+use self::commands::Desk;
 use crate::device::Device;
 use crate::fault::{Action, Agenda, Lever};
-use crate::field_bus::{FieldBus, PlannedMaster, Switches, Talker, Told};
+use crate::field_bus::{FieldBus, PlannedMaster, Talker, Told};
 use crate::manned::Manned;
 use crate::report::{Report, What};
 use crate::snapshot::{BusSnapshot, DeviceSnapshot, MasterSnapshot, SlaveSnapshot};
@@ -87,6 +91,19 @@ pub trait Medium<B: FieldBus> {
     fn station(&self, place: usize) -> Option<&Member<B>>;
     /// The station on a place, to be changed.
     fn station_mut(&mut self, place: usize) -> Option<&mut Member<B>>;
+    /// Calls a place so, and says whether there is a terminating resistor, from the next plugging in
+    /// on.
+    fn label(&mut self, place: usize, label: String, termination: bool) {
+        let _ = (place, label, termination);
+    }
+    /// Switches the terminating resistor of a station.
+    fn set_terminated(&mut self, place: usize, terminated: bool) {
+        let _ = (place, terminated);
+    }
+    /// What is wrong with the wiring, where that can be told.
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
     /// Lets the controller of a station leave the bus for a while.
     fn bus_off(&mut self, place: usize, now: Instant);
     /// Destroys what a station sends, or no more.
@@ -101,29 +118,43 @@ pub(crate) struct Crew<B: FieldBus> {
     devices: Vec<Hand<B>>,
     masters: Vec<Chief<B>>,
     agenda: Agenda,
+    desk: Desk,
     /// Of the bus itself.
     reports: Vec<Report>,
+    /// When rates were told last, and how long they are averaged at least.
     seen_at: Instant,
+    window: Duration,
 }
 
 /// A device of the crew.
 #[derive(Debug)]
 struct Hand<B: FieldBus> {
     name: String,
-    address: u8,
     product: &'static Product,
     /// The device while it has no power.
     unplugged: Option<Member<B>>,
-    /// The first master that serves it, and its address.
-    master: Option<(usize, u8)>,
+    /// Its power is cut by a fault.
+    cut: bool,
+    /// Somebody has switched it off.
+    switched_off: bool,
+    bad_transceiver: bool,
 }
 
 /// A master of the crew.
 #[derive(Debug)]
 struct Chief<B: FieldBus> {
     plan: B::MasterPlan,
-    /// The answers it had counted at the snapshot before, by the address of the slave.
-    answers: BTreeMap<u8, u64>,
+    /// What was counted of each slave, by its address.
+    counted: BTreeMap<u8, Counted>,
+}
+
+/// The answers of a slave.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counted {
+    /// At the beginning of the window that goes on.
+    answers: u64,
+    /// In the window before.
+    per_second: f64,
 }
 
 impl<B: FieldBus> Crew<B> {
@@ -135,31 +166,35 @@ impl<B: FieldBus> Crew<B> {
         for (place, (planned, mut device)) in plan.devices.iter().zip(devices).enumerate() {
             device.power_up(Instant::ZERO);
             medium.plug_in(place, Member::Device(device));
-            let master = planned.switches.address().and_then(|address| {
-                let serves = |master: &B::MasterPlan| master.serves(address);
-                Some((plan.masters.iter().position(serves)?, address))
-            });
             hands.push(Hand {
                 name: planned.name.clone(),
-                address: planned.switches.position(),
                 product: planned.product,
                 unplugged: None,
-                master,
+                cut: false,
+                switched_off: false,
+                bad_transceiver: false,
             });
         }
         for (place, master) in masters.into_iter().enumerate() {
             medium.plug_in(hands.len() + place, Member::Master(master));
         }
-        let chief = |plan| Chief { plan, answers: BTreeMap::new() };
+        let chief = |plan| Chief { plan, counted: BTreeMap::new() };
         Self {
             name: plan.name,
             bit_rate: plan.bit_rate,
             devices: hands,
             masters: plan.masters.into_iter().map(chief).collect(),
             agenda,
+            desk: Desk::default(),
             reports: Vec::new(),
             seen_at: Instant::ZERO,
+            window: Duration::ZERO,
         }
+    }
+
+    /// Averages rates over so long a time at least, however often snapshots are made.
+    pub(crate) const fn set_window(&mut self, window: Duration) {
+        self.window = window;
     }
 
     /// When something will be done to a device next.
@@ -178,24 +213,25 @@ impl<B: FieldBus> Crew<B> {
         let Some(hand) = self.devices.get_mut(place) else { return };
         match action {
             Action::Begin(Lever::PowerCut(_)) => {
-                hand.unplugged = medium.unplug(place);
-                if let Some(device) = hand.unplugged.as_mut().and_then(Member::device_mut) {
-                    device.power_cut(now);
-                }
+                hand.cut = true;
+                self.cut_power(now, place, medium);
             }
             Action::End(Lever::PowerCut(_)) => {
-                if let Some(mut member) = hand.unplugged.take() {
-                    if let Some(device) = member.device_mut() {
-                        device.power_up(now);
-                    }
-                    medium.plug_in(place, member);
+                // Somebody may have given it power meanwhile, or wants it to have none.
+                hand.cut = false;
+                if !hand.switched_off {
+                    self.give_power(now, place, medium);
                 }
             }
             Action::Begin(Lever::BusOff) => medium.bus_off(place, now),
             Action::Begin(Lever::BadTransceiver { probability, .. }) => {
+                hand.bad_transceiver = true;
                 medium.set_corruption(place, Some(probability));
             }
-            Action::End(Lever::BadTransceiver { .. }) => medium.set_corruption(place, None),
+            Action::End(Lever::BadTransceiver { .. }) => {
+                hand.bad_transceiver = false;
+                medium.set_corruption(place, None);
+            }
             Action::Begin(_) | Action::End(_) => {}
         }
         if let Some(device) = self.device_mut(place, medium) {
@@ -205,6 +241,21 @@ impl<B: FieldBus> Crew<B> {
                 Action::End(lever) => What::FaultEnds(lever.to_string()),
             };
             device.report(now, what);
+        }
+    }
+
+    /// Plugs those in anew that have another address after a reset over the bus.
+    pub(crate) fn follow_switches(&mut self, medium: &mut impl Medium<B>) {
+        for place in 0..self.devices.len() {
+            if !medium.station(place).and_then(Member::device).is_some_and(Device::has_moved) {
+                continue;
+            }
+            let Some(mut member) = medium.unplug(place) else { continue };
+            if let Some(device) = member.device_mut() {
+                device.settle();
+                medium.label(place, device.label(), device.switches().termination);
+            }
+            medium.plug_in(place, member);
         }
     }
 
@@ -238,6 +289,15 @@ impl<B: FieldBus> Crew<B> {
     }
 
     /// A device, with power or without.
+    fn device<'a>(&'a self, place: usize, medium: &'a impl Medium<B>) -> Option<&'a Device<B>> {
+        let member = match &self.devices.get(place)?.unplugged {
+            Some(member) => Some(member),
+            None => medium.station(place),
+        };
+        member?.device()
+    }
+
+    /// A device, with power or without, to be changed.
     fn device_mut<'a>(
         &'a mut self,
         place: usize,
@@ -261,26 +321,30 @@ impl<B: FieldBus> Crew<B> {
         self.listen(medium);
         let masters = self.master_snapshots(at, medium);
         let mut devices = Vec::with_capacity(self.devices.len());
-        for (place, hand) in self.devices.iter_mut().enumerate() {
-            let master = hand.master.and_then(|(master, address)| {
+        for place in 0..self.devices.len() {
+            let served = self.master_of(place, medium);
+            let master = served.and_then(|(master, address)| {
                 let slaves = &masters.get(master)?.as_ref()?.slaves;
                 slaves.iter().find(|(of, _)| *of == address).map(|(_, slave)| *slave)
             });
-            let member = match &mut hand.unplugged {
-                Some(member) => Some(member),
-                None => medium.station_mut(place),
-            };
-            let device = member.and_then(Member::device_mut);
-            let (snapshot, reports) = device.map_or_else(Default::default, |device| {
-                (device.snapshot(at), device.take_reports())
-            });
+            let served_by = served.and_then(|(master, _)| self.masters.get(master));
+            let served_by = served_by.map(|chief| chief.plan.name().to_owned());
+            let faults = self.faults(place, medium);
+            let Some(device) = self.device(place, medium) else { continue };
+            let snapshot = device.snapshot(at);
+            let state = device.state(at, snapshot.as_ref(), master.as_ref(), faults);
+            let [tens, units] = device.switches_at_power_up().rotary;
+            let reports = self.device_mut(place, medium).map(Device::take_reports);
+            let Some(hand) = self.devices.get(place) else { continue };
             devices.push(DeviceSnapshot {
                 name: hand.name.clone(),
-                address: hand.address,
+                address: tens * 10 + units,
                 product: hand.product,
                 device: snapshot,
                 master,
-                reports,
+                served_by,
+                state,
+                reports: reports.unwrap_or_default(),
             });
         }
         devices.sort_by_key(|device| device.address);
@@ -303,20 +367,27 @@ impl<B: FieldBus> Crew<B> {
         at: Instant,
         medium: &impl Medium<B>,
     ) -> Vec<Option<MasterSnapshot>> {
-        let window = at.since(self.seen_at).as_nanos() as f64 / 1e9;
-        self.seen_at = at;
+        let window = at.since(self.seen_at);
+        let is_over = window >= self.window && window > Duration::ZERO;
+        if is_over {
+            self.seen_at = at;
+        }
         let count = self.devices.len();
         let snapshot = |(place, chief): (usize, &mut Chief<B>)| {
             let master = medium.station(count + place)?.master()?;
             let cycle = master.cycle_times();
             let slaves = chief.plan.slaves().filter_map(|address| {
                 let seen = master.slave(address)?;
-                let before = chief.answers.insert(address, seen.answers).unwrap_or(0);
-                let fresh = seen.answers.saturating_sub(before) as f64;
+                let counted = chief.counted.entry(address).or_default();
+                if is_over {
+                    let fresh = seen.answers.saturating_sub(counted.answers) as f64;
+                    let per_second = fresh * 1e9 / window.as_nanos() as f64;
+                    *counted = Counted { answers: seen.answers, per_second };
+                }
                 let slave = SlaveSnapshot {
                     state: seen.state,
                     position: seen.position,
-                    answers_per_second: if window > 0.0 { fresh / window } else { 0.0 },
+                    answers_per_second: counted.per_second,
                     cycle,
                     diagnosis: seen.diagnosis,
                 };

@@ -1,19 +1,25 @@
 //! A device in a plant: switched on or off, with its memory, its faults and what it has told.
 
+mod hands;
+mod state;
+
+use std::sync::Arc;
+
 use codewheel_device::{Event, Snapshot};
-use codewheel_encoder::Start;
+use codewheel_encoder::{Geometry, Start};
 use codewheel_link::Waker;
 use codewheel_sim::Drops;
 use codewheel_station::{Duration, Instant, Station, earlier};
 use fastrand::Rng;
 
 use crate::fault::{Action, Lever};
+use crate::fault_kinds;
 use crate::field_bus::{FieldBus, Outfit, Powered, Switches};
 use crate::keeper::Keeper;
 use crate::repeats::Repeats;
 use crate::report::{Report, Reports, What};
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, DevicePlan, MemoryError, StartError};
+use crate::{BusPlan, DeviceDescription, DevicePlan, MemoryError, StartError, SwitchPositions};
 
 /// A device with everything that outlives its power.
 #[derive(Debug)]
@@ -27,6 +33,19 @@ pub struct Device<B: FieldBus> {
     /// Trouble between the device and its bus, over power cuts.
     drops: Option<Drops>,
     delay: Duration,
+    /// How its shaft moves, as text.
+    motion: Arc<str>,
+    /// Whether it was turned by hand last, so that turning it further adds up.
+    by_hand: bool,
+    /// Where its switches stand.
+    switches: SwitchPositions,
+    /// Where they stood at the last power-up.
+    switches_in_force: SwitchPositions,
+    /// The rate of its switches is not that of the bus.
+    is_apart: bool,
+    /// It has been reset over the bus, and its switches had been turned.
+    has_moved: bool,
+    rate: B::Rate,
 }
 
 #[derive(Debug)]
@@ -71,7 +90,83 @@ impl<B: FieldBus> Device<B> {
             random: Rng::with_seed(seed),
             drops: None,
             delay: Duration::ZERO,
+            motion: plan.shaft_text.as_str().into(),
+            by_hand: false,
+            switches: plan.switches.positions(),
+            switches_in_force: plan.switches.positions(),
+            is_apart: false,
+            has_moved: false,
+            rate: bus.bit_rate,
         })
+    }
+
+    /// What does not change of it, as `plan` says it; `is_served`: by a master of this plant.
+    pub(crate) fn describe(&self, plan: &DevicePlan<B>, is_served: bool) -> DeviceDescription {
+        let geometry = self.geometry();
+        DeviceDescription {
+            name: plan.name.clone(),
+            product: plan.product,
+            serial: self.outfit.serial,
+            singleturn_resolution: geometry.singleturn_resolution(),
+            revolutions: geometry.revolutions(),
+            bit_rates: B::bit_rates(),
+            rotary: B::ROTARY,
+            dip: B::DIP.to_vec(),
+            shaft_fixed: self.outfit.sensor.fixed(),
+            settings_fixed: B::settings_fixed(is_served),
+            faults: fault_kinds::of(plan.product, &plan.sensor, self.outfit.simulated),
+        }
+    }
+
+    /// What it measures with.
+    pub(crate) fn geometry(&self) -> Geometry {
+        self.outfit.model().geometry
+    }
+
+    /// Whether it may have another address than when it was plugged in.
+    pub(crate) const fn has_moved(&self) -> bool {
+        self.has_moved
+    }
+
+    /// It is plugged in anew.
+    pub(crate) const fn settle(&mut self) {
+        self.has_moved = false;
+    }
+
+    /// What observers of a wire call it.
+    pub(crate) fn label(&self) -> String {
+        format!("{} at {}", self.outfit.product.title, self.outfit.switches.position())
+    }
+
+    pub(crate) const fn outfit(&self) -> &Outfit<B> {
+        &self.outfit
+    }
+
+    pub(crate) fn sensor(&self) -> &PlantSensor {
+        match &self.power {
+            Power::On(encoder) => encoder.sensor(),
+            Power::Off(sensor) => sensor,
+        }
+    }
+
+    pub(crate) const fn motion(&self) -> &Arc<str> {
+        &self.motion
+    }
+
+    pub(crate) const fn is_by_hand(&self) -> bool {
+        self.by_hand
+    }
+
+    pub(crate) const fn switches(&self) -> &SwitchPositions {
+        &self.switches
+    }
+
+    /// Where the switches stood at the power-up that is in force, or will stand at the next one.
+    pub(crate) const fn switches_at_power_up(&self) -> &SwitchPositions {
+        match &self.power {
+            Power::On(_) => &self.switches_in_force,
+            Power::Off(_) => &self.switches,
+        }
     }
 
     /// Writes a memory file in a thread of its own from now on.
@@ -97,7 +192,22 @@ impl<B: FieldBus> Device<B> {
         encoder.set_drops(self.drops);
         encoder.set_delay(self.delay);
         self.power = Power::On(Box::new(encoder));
+        self.wake(now);
         self.listen();
+    }
+
+    /// What every power-up does: the switches are read.
+    fn wake(&mut self, now: Instant) {
+        self.switches_in_force.clone_from(&self.switches);
+        let apart = B::rate_apart(&self.outfit.switches, self.rate);
+        self.is_apart = apart.is_some();
+        if let Some(apart) = apart {
+            let text = format!(
+                "the switches say {apart} and the bus runs at {}: nobody hears the device",
+                self.rate
+            );
+            self.reports.push(now, What::Wiring(text));
+        }
     }
 
     /// Takes the power away, at any moment.
@@ -174,12 +284,23 @@ impl<B: FieldBus> Device<B> {
     /// Hears what the device has to tell.
     fn listen(&mut self) {
         let Power::On(encoder) = &mut self.power else { return };
+        let mut restarted = None;
         while let Some((at, event)) = encoder.take_event() {
+            if event == Event::PowerUp {
+                restarted = Some(at);
+            }
             match self.repeats.tell(at, event) {
                 None => {}
                 Some(1) => self.reports.push(at, What::Device(event)),
                 Some(count) => self.reports.push(at, What::Repeated { event, count }),
             }
+        }
+        // A reset over the bus is a power-up too.
+        if let Some(at) = restarted
+            && self.switches_in_force != self.switches
+        {
+            self.has_moved = true;
+            self.wake(at);
         }
     }
 
@@ -215,7 +336,9 @@ impl<B: FieldBus> Station for Device<B> {
     type Output = B::Output;
 
     fn handle(&mut self, now: Instant, input: B::Input<'_>) {
-        if let Power::On(encoder) = &mut self.power {
+        if let Power::On(encoder) = &mut self.power
+            && !self.is_apart
+        {
             encoder.handle(now, input);
             self.tend(now);
         }
@@ -230,6 +353,9 @@ impl<B: FieldBus> Station for Device<B> {
 
     fn transmit(&mut self, now: Instant) -> Option<B::Output> {
         let Power::On(encoder) = &mut self.power else { return None };
+        if self.is_apart {
+            return None;
+        }
         let output = encoder.transmit(now);
         self.hand_over_record(now);
         self.listen();
@@ -298,6 +424,21 @@ mod tests {
         device.handle(at, Input::Frame(&parse_frame("42C#8A810000").unwrap()));
         while device.transmit(at).is_some() {}
         device
+    }
+
+    /// AMG manual §9.1: the switches are read at power-up, and a reset is one.
+    #[test]
+    fn a_reset_over_the_bus_reads_the_switches_and_has_the_device_plugged_in_anew() {
+        let mut device = set_up(1);
+        device.take_reports();
+        let positions = SwitchPositions { rotary: [0, 9], ..device.switches().clone() };
+        device.set_switches(positions);
+        assert_eq!(device.switches_at_power_up().rotary, [0, 5]);
+        assert!(!device.has_moved());
+        let at = micros(2_110_000);
+        assert_eq!(hear(&mut device, at, "42C#0A050101").as_deref(), Some("42B#0A85"));
+        assert_eq!(device.switches_at_power_up().rotary, [0, 9]);
+        assert!(device.has_moved() && device.label().ends_with("at 9"));
     }
 
     #[test]

@@ -150,7 +150,7 @@ pub(crate) enum Action {
 #[derive(Clone, Debug)]
 pub(crate) struct Agenda {
     /// The next one first.
-    steps: VecDeque<(Instant, usize, Action)>,
+    pub(crate) steps: VecDeque<(Instant, usize, Action)>,
 }
 
 impl Agenda {

@@ -21,18 +21,22 @@
 //! [`Profibus`]: crate::Profibus
 
 use std::fmt;
+use std::sync::Arc;
 
-use codewheel_capture::{self as capture, BusRecorder};
+use codewheel_capture as capture;
 use codewheel_device::{Product, Snapshot, product};
-use codewheel_encoder::{Kept, Start};
+use codewheel_encoder::{Block, Kept, Model, Start};
 use codewheel_link::{BusUri, Clock, LinkError, Notice, Waker};
 use codewheel_sim::Drops;
 use codewheel_station::{Duration, Instant, Station};
 
 use crate::crew::{Medium, Member};
+use crate::ears::Ears;
 use crate::sensor::{PlantSensor, SensorPlan};
-use crate::snapshot::{CycleTimes, SlaveState};
-use crate::{BusPlan, MemoryError, StartError};
+use crate::snapshot::{CycleTimes, SlaveState, SwitchPositions};
+use crate::{
+    BusPlan, DipSwitch, MemoryError, ObjectGroup, Refusal, RotarySwitch, StartError, Value,
+};
 
 /// A station that speaks on the field bus `B`.
 pub trait Speaks<B: FieldBus>:
@@ -81,6 +85,30 @@ pub trait FieldBus: Copy + fmt::Debug + PartialEq + Send + Sized + 'static {
     /// The loop that turns a port.
     type Loop: fmt::Debug + Send;
 
+    /// The rotary switches of a bus cover.
+    const ROTARY: [RotarySwitch; 2];
+
+    /// The DIP switches of a bus cover, without the terminating resistor.
+    const DIP: &'static [DipSwitch];
+
+    /// The rates that a device of it can have, as people write them.
+    fn bit_rates() -> Vec<String>;
+
+    /// The rate that the switches of a device set, where it is not that of its bus: it hears nobody,
+    /// and nobody hears it.
+    fn rate_apart(switches: &Self::Switches, rate: Self::Rate) -> Option<Self::Rate>;
+
+    /// Why the settings of a device cannot be written, where a master of this plant serves it or not.
+    fn settings_fixed(is_served: bool) -> Option<&'static str>;
+
+    /// What can be read of a device and set, while it has power; its master, where one of this plant
+    /// serves it at an address.
+    fn objects(
+        outfit: &Outfit<Self>,
+        encoder: Option<&Self::Encoder>,
+        master: Option<(&Self::Master, u8)>,
+    ) -> Vec<ObjectGroup>;
+
     /// The master of a plan, which has the place `place` among the masters of its bus.
     ///
     /// # Errors
@@ -102,8 +130,8 @@ pub trait FieldBus: Copy + fmt::Debug + PartialEq + Send + Sized + 'static {
     /// The bus of a plan, as captures name it.
     fn captured(plan: &BusPlan<Self>) -> capture::Bus;
 
-    /// Records what the loop moves over a port at `rate`, or no more.
-    fn record(drive: &mut Self::Loop, recorder: Option<BusRecorder>, rate: Self::Rate);
+    /// Hears what the loop moves over a port at `rate`, or no more.
+    fn listen(drive: &mut Self::Loop, ears: Option<Arc<Ears>>, rate: Self::Rate);
 }
 
 /// Where the switches of a device stand.
@@ -116,6 +144,40 @@ pub trait Switches: Copy + fmt::Debug + PartialEq + Send {
 
     /// Whether the terminating resistor is on.
     fn termination(&self) -> bool;
+
+    /// Each of them; a DIP switch that means nothing is OFF.
+    fn positions(&self) -> SwitchPositions;
+
+    /// The switches in these positions.
+    fn at(positions: &SwitchPositions) -> Self;
+}
+
+/// A change of the settings of a device.
+#[derive(Clone, Copy, Debug)]
+pub enum Change<'a> {
+    /// One of them is written.
+    Write(&'a str, &'a Value),
+    /// The position of now becomes this.
+    Preset(u32),
+    /// Those in force are kept.
+    Save,
+    /// Those that are kept come into force.
+    Restore,
+    /// Those of a new device come into force.
+    Reset,
+}
+
+/// How far a change has come.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Begun {
+    /// It is done, as this sentence says.
+    Done(String),
+    /// These settings are on their way into memory.
+    Saving(Block),
+    /// The master makes the device ready anew; then it is done, as this sentence says.
+    Parameterizing(String),
+    /// The master gives the preset with this number, which has this value.
+    Presetting(u64, u32),
 }
 
 /// What every plan of a master says.
@@ -154,6 +216,14 @@ pub struct Outfit<B: FieldBus> {
     pub(crate) serial: u32,
 }
 
+impl<B: FieldBus> Outfit<B> {
+    /// What it measures with.
+    pub(crate) fn model(&self) -> Model {
+        let geometry = self.sensor.geometry().unwrap_or(self.product.encoder.geometry);
+        Model { geometry, ..self.product.encoder }
+    }
+}
+
 /// A device with power, in the trouble it has with its bus.
 pub trait Powered<B: FieldBus>: Speaks<B> {
     /// Switches a device on. What trouble there will be is drawn from `seed`.
@@ -164,6 +234,9 @@ pub trait Powered<B: FieldBus>: Speaks<B> {
         sensor: PlantSensor,
         seed: u64,
     ) -> Self;
+
+    /// The sensor.
+    fn sensor(&self) -> &PlantSensor;
 
     /// The sensor, to be changed; the device looks at it at its next `advance`.
     fn sensor_mut(&mut self) -> &mut PlantSensor;
@@ -179,6 +252,18 @@ pub trait Powered<B: FieldBus>: Speaks<B> {
 
     /// What the device shows of itself.
     fn snapshot(&self, now: Instant) -> Snapshot;
+
+    /// Turns its switches.
+    fn set_switches(&mut self, switches: B::Switches);
+
+    /// Changes its settings, where they are its own.
+    ///
+    /// # Errors
+    /// [`Refusal`]; nothing is changed.
+    fn change(&mut self, now: Instant, change: Change<'_>) -> Result<Begun, Refusal>;
+
+    /// Whether settings are on their way into memory because somebody asked for it.
+    fn is_saving(&self) -> bool;
 
     /// Which of its outputs are dropped, with what is left of their count.
     fn drops(&self) -> Option<Drops>;
@@ -215,6 +300,30 @@ pub trait Talker<B: FieldBus>: Speaks<B> {
     fn take_event(&mut self) -> Option<Told> {
         None
     }
+
+    /// Changes the settings of the slave at `address`, which measures with `model`; `None` where they
+    /// are the slave's own.
+    fn change(
+        &mut self,
+        now: Instant,
+        address: u8,
+        model: Model,
+        change: Change<'_>,
+    ) -> Option<Result<Begun, Refusal>> {
+        let _ = (now, address, model, change);
+        None
+    }
+
+    /// What became of a change; `None` as long as it is under way.
+    fn ended(&self, address: u8, begun: &Begun) -> Option<Result<(), Refusal>> {
+        let _ = (address, begun);
+        None
+    }
+
+    /// Gives up a change that is under way.
+    fn give_up(&mut self, address: u8, begun: &Begun) {
+        let _ = (address, begun);
+    }
 }
 
 /// Something that a master tells.
@@ -246,12 +355,14 @@ pub trait Line<B: FieldBus>: Sized + fmt::Debug + Send {
     fn node_mut(&mut self, id: Self::Id) -> Option<&mut Member<B>>;
     /// Lets the controller of a station leave the bus, where there is one.
     fn bus_off(&mut self, id: Self::Id);
+    /// Switches the terminating resistor of a station.
+    fn set_terminated(&mut self, id: Self::Id, terminated: bool);
     /// Destroys what a station sends, or no more.
     fn set_corruption_at(&mut self, id: Self::Id, probability: Option<f64>);
     /// Moves time on.
     fn run_until(&mut self, until: Instant, observer: &mut impl FnMut(&Self::Event));
-    /// Records an event, where it is something that the wire carried.
-    fn record(event: &Self::Event, recorder: &BusRecorder);
+    /// Hears an event, where it is something that the wire carried.
+    fn record(event: &Self::Event, ears: &Ears);
     /// The virtual time.
     fn now(&self) -> Instant;
     /// What has been counted.

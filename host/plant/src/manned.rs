@@ -4,10 +4,10 @@ use codewheel_link::Waker;
 use codewheel_station::Instant;
 
 use crate::device::Device;
-use crate::field_bus::FieldBus;
+use crate::field_bus::{FieldBus, PlannedMaster, Switches};
 use crate::keeper::Keeper;
 use crate::report::What;
-use crate::{BusPlan, StartError};
+use crate::{BusDescription, BusPlan, MasterDescription, StartError};
 
 /// A plan, and everybody in it, ready to be switched on.
 #[derive(Debug)]
@@ -35,6 +35,28 @@ impl<B: FieldBus> Manned<B> {
             masters.push(Box::new(B::make_master(planned, place)?));
         }
         Ok(Self { plan, devices, masters })
+    }
+
+    /// What does not change from here on.
+    pub(crate) fn describe(&self) -> BusDescription {
+        let plan = &self.plan;
+        let masters = plan.masters.iter().map(|master| MasterDescription {
+            name: master.name().to_owned(),
+            address: master.address(),
+        });
+        let devices = plan.devices.iter().zip(&self.devices).map(|(planned, device)| {
+            let address = planned.switches.address();
+            let serves = |master: &B::MasterPlan| address.is_some_and(|at| master.serves(at));
+            device.describe(planned, plan.masters.iter().any(serves))
+        });
+        BusDescription {
+            name: plan.name.clone(),
+            bus: B::BUS,
+            uri: plan.uri.to_string(),
+            bit_rate: plan.bit_rate.to_string(),
+            devices: devices.collect(),
+            masters: masters.collect(),
+        }
     }
 
     /// Writes memory files in threads.

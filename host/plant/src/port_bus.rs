@@ -1,20 +1,25 @@
 //! A bus on a real port: all its devices and masters share the port.
 
-use codewheel_capture::BusRecorder;
+use std::sync::Arc;
+
 use codewheel_commission::profibus::SettingsError;
-use codewheel_encoder::ssi::Refusal;
+use codewheel_encoder::ssi;
 use codewheel_link::{Clock, LinkError, Waker};
 #[cfg(target_os = "linux")]
 use codewheel_spidev::CannotOpen;
 use codewheel_spidev::SsiUri;
-use codewheel_station::{Instant, earlier};
+use codewheel_station::{Duration, Instant, earlier};
 use thiserror::Error;
 
 use crate::crew::Crew;
+use crate::ears::Ears;
 use crate::field_bus::{FieldBus, Shared};
 use crate::manned::Manned;
 use crate::report::{Report, What};
-use crate::{BusPlan, BusSnapshot, DeviceNet, MemoryError, RecordError, Recording};
+use crate::{
+    BusPlan, BusSnapshot, Command, DeviceNet, Done, MemoryError, ObjectGroup, RecordError,
+    Recording, Refusal, Ticket,
+};
 
 /// Why a plant cannot be started.
 #[derive(Debug, Error)]
@@ -30,7 +35,7 @@ pub enum StartError {
     Master(#[from] SettingsError),
     /// An SSI line cannot be read as its plan says.
     #[error(transparent)]
-    Ssi(#[from] Refusal),
+    Ssi(#[from] ssi::Refusal),
     /// An SPI controller cannot be an SSI line.
     #[cfg(target_os = "linux")]
     #[error(transparent)]
@@ -91,11 +96,31 @@ impl<B: FieldBus> PortBus<B> {
     /// Records what the port carries from now on, as the bus at `place` of the recording, until
     /// [`finish`](Self::finish).
     pub fn record(&mut self, recording: &Recording, place: usize) {
-        self.record_with(recording.bus(place, self.now()));
+        let recorder = recording.bus(place, self.now());
+        self.listen(Some(Arc::new(Ears::new(Some(recorder)))));
     }
 
-    pub(crate) fn record_with(&mut self, recorder: BusRecorder) {
-        B::record(&mut self.drive, Some(recorder), self.rate);
+    pub(crate) fn listen(&mut self, ears: Option<Arc<Ears>>) {
+        B::listen(&mut self.drive, ears, self.rate);
+    }
+
+    /// Does something to the device that the plan calls `device`. What became of it,
+    /// [`take_answer`](Self::take_answer) says.
+    pub fn command(&mut self, device: &str, command: &Command) -> Ticket {
+        self.crew.command(self.now(), device, command, &mut self.stations)
+    }
+
+    /// What became of a command; `None` as long as it is under way, or when it was asked for already.
+    pub fn take_answer(&mut self, ticket: Ticket) -> Option<Result<Done, Refusal>> {
+        self.crew.take_answer(self.now(), ticket, &mut self.stations)
+    }
+
+    /// What can be read of a device and set, with the values of now.
+    ///
+    /// # Errors
+    /// [`Refusal`] where there is no such device.
+    pub fn objects(&self, device: &str) -> Result<Vec<ObjectGroup>, Refusal> {
+        self.crew.objects(device, &self.stations)
     }
 
     /// One turn of the stations and the port: waits once, for input, a wake-up, a deadline, a fault
@@ -114,6 +139,11 @@ impl<B: FieldBus> PortBus<B> {
         Ok(())
     }
 
+    /// Averages rates over so long a time at least, however often snapshots are made.
+    pub(crate) const fn set_window(&mut self, window: Duration) {
+        self.crew.set_window(window);
+    }
+
     /// The bus now. What it reports is taken out.
     pub fn snapshot(&mut self) -> BusSnapshot {
         self.crew.snapshot(self.now(), self.uri.clone(), None, &mut self.stations)
@@ -126,7 +156,7 @@ impl<B: FieldBus> PortBus<B> {
 
     /// Waits until the memories have taken everything, and records no more.
     pub fn finish(&mut self) {
-        B::record(&mut self.drive, None, self.rate);
+        self.listen(None);
         self.crew.finish_memories(self.now(), &mut self.stations);
     }
 

@@ -1,6 +1,7 @@
 //! What buses carry, on its way into a capture.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use codewheel_capture::{
     Bus, BusRecorder, Condition, Direction, Format, Framer, Recorded, Recorder, WriteError,
@@ -10,6 +11,8 @@ use codewheel_station::Instant;
 use codewheel_station::can::Frame;
 use codewheel_station::rs485::BaudRate;
 use thiserror::Error;
+
+use crate::ears::Ears;
 
 /// Why buses cannot be recorded.
 #[derive(Debug, Error)]
@@ -77,9 +80,9 @@ impl Recording {
     }
 }
 
-/// Records the frames of a CAN port.
+/// Hears the frames of a CAN port.
 #[derive(Debug)]
-pub(crate) struct Frames(pub(crate) BusRecorder);
+pub(crate) struct Frames(pub(crate) Arc<Ears>);
 
 impl Tap for Frames {
     fn received(&mut self, at: Instant, frame: &Frame) {
@@ -91,40 +94,40 @@ impl Tap for Frames {
     }
 }
 
-/// Records the telegrams of an RS-485 port. Dropping it records what came and has no end yet.
+/// Hears the telegrams of an RS-485 port. Dropping it tells what came and has no end yet.
 #[derive(Debug)]
 pub(crate) struct Telegrams {
-    recorder: BusRecorder,
+    ears: Arc<Ears>,
     framer: Framer,
 }
 
 impl Telegrams {
-    pub(crate) fn new(recorder: BusRecorder, rate: BaudRate) -> Self {
-        Self { recorder, framer: Framer::new(rate) }
+    pub(crate) fn new(ears: Arc<Ears>, rate: BaudRate) -> Self {
+        Self { ears, framer: Framer::new(rate) }
     }
 }
 
 /// What a framer gives its telegrams to.
-fn received(recorder: &BusRecorder) -> impl FnMut(Instant, &[u8], Condition) {
-    |at, octets, condition| recorder.telegram(at, octets, condition, Direction::Received)
+fn received(ears: &Ears) -> impl FnMut(Instant, &[u8], Condition) {
+    |at, octets, condition| ears.telegram(at, octets, condition, Direction::Received)
 }
 
 impl Rs485Tap for Telegrams {
     fn received(&mut self, at: Instant, octets: &[u8]) {
-        self.framer.push(at, octets, &mut received(&self.recorder));
+        self.framer.push(at, octets, &mut received(&self.ears));
     }
 
     fn broken_character(&mut self, at: Instant) {
-        self.framer.broken(at, &mut received(&self.recorder));
+        self.framer.broken(at, &mut received(&self.ears));
     }
 
     fn sent(&mut self, at: Instant, octets: &[u8]) {
-        self.recorder.telegram(at, octets, Condition::Intact, Direction::Sent);
+        self.ears.telegram(at, octets, Condition::Intact, Direction::Sent);
     }
 }
 
 impl Drop for Telegrams {
     fn drop(&mut self) {
-        self.framer.end(&mut received(&self.recorder));
+        self.framer.end(&mut received(&self.ears));
     }
 }

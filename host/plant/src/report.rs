@@ -49,6 +49,8 @@ pub enum What {
     Port(Notice),
     /// The bus is wired wrongly.
     Wiring(String),
+    /// Somebody has done it to the device.
+    Hand(String),
     /// So many reports were lost because nobody fetched them.
     Lost(u64),
 }
@@ -61,6 +63,7 @@ impl What {
             Self::Device(event) | Self::Repeated { event, .. } => event.is_trouble(),
             Self::Master { trouble, .. } => *trouble,
             Self::Port(notice) => notice.is_trouble(),
+            Self::Hand(_) => false,
             _ => true,
         }
     }
@@ -88,7 +91,7 @@ impl fmt::Display for What {
             Self::NotKept(error) => f.write_str(error),
             Self::Master { name, text, .. } => write!(f, "{name}: {text}"),
             Self::Port(notice) => notice.fmt(f),
-            Self::Wiring(warning) => f.write_str(warning),
+            Self::Wiring(text) | Self::Hand(text) => f.write_str(text),
             Self::Lost(count) => write!(f, "{count} reports were lost before they were fetched"),
         }
     }

@@ -4,7 +4,7 @@ use codewheel_device::Product;
 use codewheel_encoder::ssi::{self, Input};
 use codewheel_encoder::{Geometry, Sample, Sensor};
 use codewheel_sim::shaft::{Faulty, Shaft};
-use codewheel_sim::ssi::{Behaviour, VirtualEncoder, VirtualLine};
+use codewheel_sim::ssi::{Behaviour, Fault, VirtualEncoder, VirtualLine};
 #[cfg(target_os = "linux")]
 use codewheel_spidev::SpidevLine;
 use codewheel_spidev::SsiUri;
@@ -43,6 +43,14 @@ impl SensorPlan {
         match self {
             Self::Disc => None,
             Self::Ssi(settings) | Self::SsiLine(settings, _) => Some(settings.word.geometry()),
+        }
+    }
+
+    /// Why nobody can turn the shaft from here.
+    pub(crate) const fn fixed(&self) -> Option<&'static str> {
+        match self {
+            Self::Disc | Self::Ssi(_) => None,
+            Self::SsiLine(..) => Some("a real encoder is at the SSI line: turn its shaft"),
         }
     }
 }
@@ -113,6 +121,32 @@ impl PlantSensor {
             Lever::CellLow(low) => disc.set_cell_low(low),
             Lever::Stuck(stuck) => disc.set_stuck(stuck),
             _ => {}
+        }
+    }
+
+    /// The disc on the shaft of this plant, with its faults.
+    pub(crate) const fn shaft(&self) -> Option<&Faulty<Shaft>> {
+        match self {
+            Self::Disc(disc) => Some(disc),
+            Self::Ssi(input) => Some(input.line().encoder().sensor()),
+            #[cfg(target_os = "linux")]
+            Self::Spidev(_) => None,
+            Self::Gone => None,
+        }
+    }
+
+    /// Puts another shaft in the place of the one of this plant.
+    pub(crate) fn set_shaft(&mut self, shaft: Shaft) {
+        if let Some(disc) = self.disc() {
+            *disc.sensor_mut() = shaft;
+        }
+    }
+
+    /// What is wrong with the SSI line of this plant.
+    pub(crate) const fn line_fault(&self) -> Option<Fault> {
+        match self {
+            Self::Ssi(input) => input.line().encoder().fault(),
+            _ => None,
         }
     }
 

@@ -1,12 +1,14 @@
 //! A bus in virtual time: a simulated wire with its devices and masters.
 
-use codewheel_station::Instant;
+use codewheel_station::{Duration, Instant};
 
 use crate::crew::{Crew, Medium, Member};
 use crate::field_bus::{FieldBus, Line, PlannedMaster, Switches};
 use crate::manned::{Manned, seed_at};
 use crate::report::What;
-use crate::{BusPlan, BusSnapshot, DeviceNet, StartError};
+use crate::{
+    BusPlan, BusSnapshot, Command, DeviceNet, Done, ObjectGroup, Refusal, StartError, Ticket,
+};
 
 /// A bus in virtual time, which begins at zero. Whoever owns it moves the time on.
 ///
@@ -17,7 +19,11 @@ pub struct VirtualBus<B: FieldBus = DeviceNet> {
     uri: String,
     segment: Segment<B>,
     crew: Crew<B>,
+    /// What had been counted when the load was told last, and when that was.
     seen: <B::Line as Line<B>>::Statistics,
+    seen_at: Instant,
+    load: f64,
+    window: Duration,
 }
 
 /// A wire whose stations have places and can lose their power.
@@ -70,7 +76,7 @@ impl<B: FieldBus> VirtualBus<B> {
             crew.report(Instant::ZERO, What::Wiring(warning));
         }
         let seen = segment.wire.statistics();
-        Self { uri, segment, crew, seen }
+        Self { uri, segment, crew, seen, seen_at: Instant::ZERO, load: 0.0, window: Duration::ZERO }
     }
 
     /// Runs the bus up to `until`. `observer` sees what happens on the wire.
@@ -84,15 +90,50 @@ impl<B: FieldBus> VirtualBus<B> {
             self.crew.pull_levers(at, &mut self.segment);
         }
         self.segment.wire.run_until(until, observer);
+        self.crew.follow_switches(&mut self.segment);
+    }
+
+    /// Averages rates and load over so long a time at least, however often snapshots are made.
+    pub(crate) const fn set_window(&mut self, window: Duration) {
+        self.window = window;
+        self.crew.set_window(window);
     }
 
     /// The bus now. What it reports is taken out.
     pub fn snapshot(&mut self) -> BusSnapshot {
         let statistics = self.segment.wire.statistics();
-        let load = B::Line::load(&statistics, &self.seen);
-        self.seen = statistics;
         let at = self.segment.wire.now();
-        self.crew.snapshot(at, self.uri.clone(), Some(load), &mut self.segment)
+        if at.since(self.seen_at) >= self.window {
+            self.load = B::Line::load(&statistics, &self.seen);
+            (self.seen, self.seen_at) = (statistics, at);
+        }
+        self.crew.snapshot(at, self.uri.clone(), Some(self.load), &mut self.segment)
+    }
+
+    /// Does something to the device that the plan calls `device`, now. What became of it,
+    /// [`take_answer`](Self::take_answer) says.
+    pub fn command(&mut self, device: &str, command: &Command) -> Ticket {
+        let now = self.segment.wire.now();
+        self.crew.command(now, device, command, &mut self.segment)
+    }
+
+    /// What became of a command; `None` as long as it is under way, or when it was asked for already.
+    pub fn take_answer(&mut self, ticket: Ticket) -> Option<Result<Done, Refusal>> {
+        let now = self.segment.wire.now();
+        self.crew.take_answer(now, ticket, &mut self.segment)
+    }
+
+    /// What can be read of a device and set, with the values of now.
+    ///
+    /// # Errors
+    /// [`Refusal`] where there is no such device.
+    pub fn objects(&self, device: &str) -> Result<Vec<ObjectGroup>, Refusal> {
+        self.crew.objects(device, &self.segment)
+    }
+
+    /// Its time.
+    pub(crate) fn now(&self) -> Instant {
+        self.segment.wire.now()
     }
 
     /// What has been counted on the wire.
@@ -136,6 +177,25 @@ impl<B: FieldBus> Medium<B> for Segment<B> {
     fn station_mut(&mut self, place: usize) -> Option<&mut Member<B>> {
         let id = self.id(place)?;
         self.wire.node_mut(id)
+    }
+
+    fn label(&mut self, place: usize, label: String, termination: bool) {
+        if let Some(place) = self.places.get_mut(place) {
+            place.name = label;
+            place.terminated = termination;
+        }
+    }
+
+    fn set_terminated(&mut self, place: usize, terminated: bool) {
+        let Some(known) = self.places.get_mut(place) else { return };
+        known.terminated = terminated;
+        if let Some(id) = known.id {
+            self.wire.set_terminated(id, terminated);
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.wire.warnings()
     }
 
     fn bus_off(&mut self, place: usize, _: Instant) {

@@ -21,6 +21,7 @@
 //! computed in floating point, freshly for each moment.
 
 mod faulty;
+mod hand;
 mod motion;
 mod number;
 mod table;

@@ -5,13 +5,13 @@ use codewheel_devicenet::{
     Application, Class, Done, Identity, MacId, NetworkSettings, Request, Reset, Server,
     SwitchPositions,
 };
-use codewheel_encoder::{Block, Encoder, Sensor, Settings, Start};
+use codewheel_encoder::{Block, Encoder, Refusal, Sensor, Settings, Start};
 use codewheel_station::{Deadline, Instant, Writer};
 
 use super::Factory;
 use super::keeping::Keeping;
 use super::parameter::{self, PARAMETER};
-use super::rows::{ENCODER_POSITION, PRESET, Row, View};
+use super::rows::{ENCODER_POSITION, PRESET, Row, View, Write};
 use crate::event::{DeviceNetEvent, Events, Happening};
 use crate::instrument::Instrument;
 use crate::keeping::{self, MemoryState};
@@ -159,6 +159,29 @@ impl<S: Sensor> Body<S> {
         View { product: self.product(), encoder: self.encoder() }
     }
 
+    /// Writes a value that has the data type of its row.
+    pub(super) fn write(
+        &mut self,
+        now: Instant,
+        row: &Row,
+        write: Write,
+        value: i64,
+    ) -> Result<(), Refusal> {
+        // A preset takes effect at the position of this very moment.
+        self.sample(now);
+        let before = self.measure();
+        let changed = write(&mut self.instrument.encoder, value)?;
+        self.produce_anyway |= before != self.measure();
+        if row.attribute == PRESET {
+            // Every preset is produced, also one that finds its value in place.
+            self.produce_anyway = true;
+            self.tell(now, Happening::Preset);
+        } else if changed {
+            self.tell(now, DeviceNetEvent::SettingChanged { attribute: row.attribute });
+        }
+        Ok(())
+    }
+
     /// The services of one parameter. Save, Restore and Reset are for all parameters together, at
     /// class level (decision: the conformance test wants 08 at an instance).
     fn parameter_service(
@@ -181,7 +204,8 @@ impl<S: Sensor> Body<S> {
     }
 
     /// Save, Restore and Reset of class 2Fh.
-    fn memory_service(&mut self, now: Instant, service: Service) -> Result<Done, Error> {
+    pub(super) fn memory_service(&mut self, now: Instant, service: Service) -> Result<Done, Error> {
+        self.sample(now);
         match service {
             Service::SAVE => self.save(now, self.encoder().block(), false),
             Service::RESTORE => {
@@ -335,19 +359,8 @@ impl<S: Sensor> Application for Body<S> {
         };
         let write = row.write.ok_or(Error::from(GeneralStatus::ATTRIBUTE_NOT_SETTABLE))?;
         let value = row.decode(data)?;
-        // A preset takes effect at the position of this very moment.
-        self.sample(now);
-        let before = self.measure();
-        let changed = write(&mut self.instrument.encoder, value)
+        self.write(now, row, write, value)
             .map_err(|_| Error::from(GeneralStatus::INVALID_ATTRIBUTE_VALUE))?;
-        self.produce_anyway |= before != self.measure();
-        if row.attribute == PRESET {
-            // Every preset is produced, also one that finds its value in place.
-            self.produce_anyway = true;
-            self.tell(now, Happening::Preset);
-        } else if changed {
-            self.tell(now, DeviceNetEvent::SettingChanged { attribute: row.attribute });
-        }
         Ok(Done::Now)
     }
 
@@ -371,7 +384,6 @@ impl<S: Sensor> Application for Body<S> {
         if known {
             expect_nothing(request.data)?;
         }
-        self.sample(now);
         self.memory_service(now, request.service)
     }
 

@@ -95,6 +95,11 @@ impl Keeping {
         true
     }
 
+    /// Whether a Save has not come to its end.
+    pub(super) const fn is_saving(&self) -> bool {
+        self.save.is_some()
+    }
+
     /// Whether the record of a Save is on its way into memory.
     fn writes_save(&self) -> bool {
         self.save.is_some_and(|save| save.is_writing)

@@ -2,6 +2,7 @@
 
 mod body;
 mod keeping;
+mod local;
 pub mod parameter;
 pub mod rows;
 
@@ -18,6 +19,8 @@ use crate::instrument::Instrument;
 use crate::lamp::Lamp;
 use crate::snapshot::{DeviceNetState, Network};
 use crate::{Product, Snapshot, Switches};
+
+pub use local::NotWritten;
 
 /// What the factory puts into a device besides its product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,7 +97,13 @@ impl<S: Sensor> DeviceNetEncoder<S> {
         &self.server
     }
 
-    /// The sensor. Whoever changes it makes the device look at it at its next
+    /// The sensor.
+    #[must_use]
+    pub const fn sensor(&self) -> &S {
+        &self.body.instrument.sensor
+    }
+
+    /// The sensor, to be changed. Whoever changes it makes the device look at it at its next
     /// [`advance`](Station::advance).
     pub const fn sensor_mut(&mut self) -> &mut S {
         self.body.instrument.sensor_mut()

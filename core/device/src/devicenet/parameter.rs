@@ -149,15 +149,10 @@ pub fn range(row: &Row, view: View<'_>) -> Range {
         return range(view);
     }
     let last_name = row.values.len() as i64 - 1;
-    let maximum = match row.data_type {
-        _ if last_name > 0 => last_name,
-        DataType::Bool => 1,
-        DataType::Usint | DataType::UsintArray => i64::from(u8::MAX),
-        DataType::Uint => i64::from(u16::MAX),
-        DataType::Udint => i64::from(u32::MAX),
-        DataType::Dint => i64::from(i32::MAX),
-    };
-    let minimum = if row.data_type == DataType::Dint { i64::from(i32::MIN) } else { 0 };
+    let Range { minimum, mut maximum } = row.data_type.range();
+    if last_name > 0 {
+        maximum = last_name;
+    }
     // A value that never changes is its own limit.
     match (row.read)(view) {
         Value::Number(value) if row.source == Source::Reading && !row.changes => {

@@ -55,6 +55,19 @@ impl DataType {
             Self::UsintArray => 0,
         }
     }
+
+    /// The numbers that it can be; of an array each of its octets.
+    #[must_use]
+    pub const fn range(self) -> Range {
+        let (minimum, maximum) = match self {
+            Self::Bool => (0, 1),
+            Self::Usint | Self::UsintArray => (0, u8::MAX as i64),
+            Self::Uint => (0, u16::MAX as i64),
+            Self::Udint => (0, u32::MAX as i64),
+            Self::Dint => (i32::MIN as i64, i32::MAX as i64),
+        };
+        Range { minimum, maximum }
+    }
 }
 
 /// The value of an attribute.
@@ -85,7 +98,7 @@ pub struct View<'a> {
 }
 
 /// The smallest and the largest value a parameter takes now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Range {
     /// The smallest.
     pub minimum: i64,
@@ -568,6 +581,12 @@ impl Row {
     #[must_use]
     pub fn find(attribute: u8) -> Option<&'static Self> {
         ROWS.iter().find(|row| row.attribute == attribute)
+    }
+
+    /// The row with this key.
+    #[must_use]
+    pub fn with_key(key: &str) -> Option<&'static Self> {
+        ROWS.iter().find(|row| row.key == key)
     }
 
     /// Writes the value as the wire carries it.

@@ -165,6 +165,16 @@ impl<S: Sensor> Body<S> {
         self.encoder().alarm() || self.preset_refused
     }
 
+    /// What the diagnosis reads from.
+    pub(super) const fn view(&self) -> diagnosis::View<'_> {
+        diagnosis::View {
+            product: self.product(),
+            encoder: self.encoder(),
+            class: if self.is_short { 1 } else { 2 },
+            alarm: self.alarm(),
+        }
+    }
+
     /// What the lamp says while the slave is in `state`.
     pub(super) fn lamp(&self, state: State) -> Lamp {
         Lamp::of_slave(SlaveStatus {
@@ -372,14 +382,8 @@ impl<S: Sensor> Application for Body<S> {
 
     fn diagnosis(&mut self, now: Instant, out: &mut Writer<'_>) {
         self.sample(now);
-        let view = diagnosis::View {
-            product: self.product(),
-            encoder: self.encoder(),
-            class: if self.is_short { 1 } else { 2 },
-            alarm: self.alarm(),
-        };
         // The stack has room for the longest.
-        let _ = diagnosis::write(&view, out);
+        let _ = diagnosis::write(&self.view(), out);
     }
 
     #[inline]

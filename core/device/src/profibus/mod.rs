@@ -96,7 +96,13 @@ impl<S: Sensor> ProfibusEncoder<S> {
         &self.slave
     }
 
-    /// The sensor. Whoever changes it makes the device look at it at its next
+    /// The sensor.
+    #[must_use]
+    pub const fn sensor(&self) -> &S {
+        &self.body.instrument.sensor
+    }
+
+    /// The sensor, to be changed. Whoever changes it makes the device look at it at its next
     /// [`advance`](Station::advance).
     pub const fn sensor_mut(&mut self) -> &mut S {
         self.body.instrument.sensor_mut()
@@ -106,6 +112,12 @@ impl<S: Sensor> ProfibusEncoder<S> {
     /// it was never set (decision). A constant of the factory, so it outlasts the power.
     pub fn set_speed_limit(&mut self, rpm: u32) {
         self.body.instrument.set_speed_limit(rpm);
+    }
+
+    /// The value of a row of the diagnosis as of the newest sample.
+    #[must_use]
+    pub fn read(&self, row: &diagnosis::Row) -> diagnosis::Value {
+        (row.read)(&self.body.view())
     }
 
     /// Where the switches stand.

@@ -5,6 +5,7 @@ mod anything_at_all;
 mod bench;
 mod change_of_state;
 mod identity;
+mod local;
 mod memory;
 mod on_the_wire;
 mod parameter_object;

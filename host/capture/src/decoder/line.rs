@@ -1,6 +1,8 @@
 //! A line for people, or a JSON object, of the same words.
 
-use super::Output;
+use std::ops::Range;
+
+use super::{Caption, Output};
 use crate::format::log::push_frame;
 use crate::hex::{push_decimal, push_octets};
 use crate::said::Listener;
@@ -26,6 +28,10 @@ pub(super) struct Line<'o> {
     /// The name of the next value has been said already.
     told: bool,
     listener: Listener<'o>,
+    /// Who speaks to whom.
+    ends: (Option<u8>, Option<u8>),
+    /// Where the kind of message stands.
+    message: Range<usize>,
 }
 
 /// Frames are padded to this width, so that what they say stands below each other.
@@ -82,7 +88,17 @@ impl<'o> Line<'o> {
                 out.push(b'"');
             }
         }
-        Self { out, output, values: false, notes: false, told: false, listener }
+        let message = out.len()..out.len();
+        Self {
+            out,
+            output,
+            values: false,
+            notes: false,
+            told: false,
+            listener,
+            ends: (None, None),
+            message,
+        }
     }
 
     /// What the record says, for whoever hears it.
@@ -92,6 +108,7 @@ impl<'o> Line<'o> {
 
     /// Who speaks to whom, where that is known.
     pub(super) fn ends(&mut self, from: Option<u8>, to: Option<u8>) {
+        self.ends = (from, to);
         match self.output {
             Output::Text => {
                 if let Some(from) = from {
@@ -119,7 +136,11 @@ impl<'o> Line<'o> {
     /// What kind of message it is.
     pub(super) fn message(&mut self, message: &str) {
         match self.output {
-            Output::Text => self.text(message),
+            Output::Text => {
+                let begin = self.out.len();
+                self.text(message);
+                self.message = begin..self.out.len();
+            }
             Output::Json => {
                 self.text(",\"message\":\"");
                 self.text(message);
@@ -277,6 +298,15 @@ impl<'o> Line<'o> {
         }
         self.notes = true;
         parts.iter().for_each(|part| self.text(part));
+    }
+
+    /// Ends a line of text that is wanted in its parts.
+    pub(super) fn into_caption(self) -> Caption {
+        let part = |range| String::from_utf8_lossy(self.out.get(range).unwrap_or_default());
+        let (from, to) = self.ends;
+        let behind = part(self.message.end..self.out.len());
+        let text = behind.trim_start_matches(':').trim();
+        Caption { from, to, message: part(self.message).into_owned(), text: text.to_owned() }
     }
 
     pub(super) fn end(mut self, content: &Content<'_>) {

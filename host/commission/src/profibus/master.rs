@@ -54,6 +54,17 @@ pub enum NotSet {
     },
 }
 
+/// Why user parameters are not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum NotParameterized {
+    /// No slave has this address.
+    #[error("the master has no slave {0}")]
+    UnknownSlave(u8),
+    /// They are too many.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+}
+
 /// A PROFIBUS-DP master with up to 125 slaves.
 pub struct Master {
     pub(super) settings: MasterSettings,
@@ -174,6 +185,29 @@ impl Master {
         }
         slave.outputs.copy_from_slice(outputs);
         slave.outputs_waiting = true;
+        Ok(())
+    }
+
+    /// Gives the slave at `address` other user parameters, octets 8 and following of Set_Prm, and
+    /// makes it ready anew with them as soon as it owes no answer. Until then
+    /// [`SlaveView::parameters_waiting`] is set.
+    ///
+    /// # Errors
+    /// [`NotParameterized`]; nothing is changed.
+    pub fn set_user_parameters(
+        &mut self,
+        address: u8,
+        user_parameters: Vec<u8>,
+    ) -> Result<(), NotParameterized> {
+        let slave = self
+            .slaves
+            .iter_mut()
+            .find(|slave| slave.settings.address == address)
+            .ok_or(NotParameterized::UnknownSlave(address))?;
+        let wanted = slave.renewal.as_ref().unwrap_or(&slave.settings);
+        let wanted = SlaveSettings { user_parameters, ..wanted.clone() };
+        wanted.check(self.settings.address)?;
+        slave.renewal = Some(wanted);
         Ok(())
     }
 

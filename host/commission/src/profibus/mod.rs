@@ -75,7 +75,7 @@ pub use console::Console;
 pub use eavesdropper::Eavesdropper;
 pub use encoder::{Encoder, SessionSettings};
 pub use event::{EVENTS, Event};
-pub use master::{Counters, Master, NotSet, UnknownSlave};
+pub use master::{Counters, Master, NotParameterized, NotSet, UnknownSlave};
 pub use overheard::{HeardExchange, HeardMaster, HeardSetting, HeardSlave, Overheard};
 pub use scan::{ScanSettings, scan};
 pub use settings::{

@@ -105,6 +105,10 @@ pub struct SlaveView<'a> {
     pub input_at: Option<Instant>,
     /// The outputs that it gets.
     pub outputs: &'a [u8],
+    /// The user parameters that it gets, from its next Set_Prm on.
+    pub user_parameters: &'a [u8],
+    /// Whether it has yet to be made ready anew with them.
+    pub parameters_waiting: bool,
     /// Its latest diagnosis.
     pub diagnosis: Option<&'a Diagnosis>,
     /// Data exchanges completed.
@@ -232,11 +236,12 @@ impl Slave {
         }
     }
 
-    /// Is begun anew with other settings; what was counted stays.
+    /// Is begun anew with other settings; what was counted stays, and so do outputs that still fit.
     pub(super) fn renew(&mut self, settings: SlaveSettings) {
         if self.state != SlaveState::Absent {
             self.state = SlaveState::Configuring;
         }
+        let outputs = std::mem::take(&mut self.outputs);
         *self = Self {
             state: self.state,
             answers: self.answers,
@@ -245,6 +250,10 @@ impl Slave {
             diagnosis: self.diagnosis.take(),
             ..Self::new(settings, self.handle)
         };
+        if outputs.len() == self.outputs.len() {
+            self.outputs = outputs;
+            self.outputs_waiting = true;
+        }
     }
 
     /// The peripheral that stands for it in profirust.
@@ -282,6 +291,8 @@ impl Slave {
             inputs: &self.inputs,
             input_at: self.input_at,
             outputs: &self.outputs,
+            user_parameters: &self.renewal.as_ref().unwrap_or(&self.settings).user_parameters,
+            parameters_waiting: self.renewal.is_some(),
             diagnosis: self.diagnosis.as_ref(),
             answers: self.answers,
             repetitions: self.repetitions,

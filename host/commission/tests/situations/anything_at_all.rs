@@ -69,6 +69,10 @@ enum Doing {
     Diagnosis {
         slave: u8,
     },
+    Parameters {
+        slave: u8,
+        length: usize,
+    },
     Outputs {
         slave: u8,
         value: u8,
@@ -92,6 +96,8 @@ fn doing() -> impl Strategy<Value = Doing> {
         1 => slave.prop_map(|slave| Doing::Restart { slave }),
         1 => (7_u8..11).prop_map(|slave| Doing::Diagnosis { slave }),
         1 => (7_u8..11, any::<u8>()).prop_map(|(slave, value)| Doing::Outputs { slave, value }),
+        1 => (7_u8..11, 0_usize..20)
+            .prop_map(|(slave, length)| Doing::Parameters { slave, length }),
         2 => bits.prop_map(|bits| Doing::Run { bits }),
     ]
 }
@@ -114,6 +120,9 @@ fn do_it(bench: &mut Bench, doing: Doing) {
         Doing::Lose { slave, answers } => bench.slaves[slave].lose = answers,
         Doing::Restart { slave } => bench.slaves[slave].restart(),
         Doing::Diagnosis { slave } => drop(bench.master().request_diagnosis(slave)),
+        Doing::Parameters { slave, length } => {
+            let _ = bench.master().set_user_parameters(slave, vec![0; length]);
+        }
         Doing::Outputs { slave, value } => drop(bench.master().set_outputs(slave, &[value; 4])),
         Doing::Run { bits } => bench.run_bits(bits),
     }

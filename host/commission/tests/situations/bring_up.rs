@@ -58,6 +58,30 @@ fn inputs_come_and_outputs_go_in_each_cycle() {
 }
 
 #[test]
+fn other_parameters_of_any_length_make_the_slave_ready_anew_and_the_rest_goes_on() {
+    let mut bench = Bench::new(RATE, vec![Scripted::new(7), Scripted::new(8)]);
+    bench.bring_up();
+    bench.master().set_outputs(7, &[0, 0, 0, 42]).unwrap();
+    for length in [2_usize, 10, 0, 18, 237] {
+        bench.events();
+        let losses = bench.master().slave(7).unwrap().losses;
+        bench.master().set_user_parameters(7, vec![0x5A; length]).unwrap();
+        assert!(bench.master().slave(7).unwrap().parameters_waiting);
+        bench.run(Duration::from_millis(50));
+        assert_eq!(bench.slaves[0].parameters[7..], vec![0x5A; length], "{length}");
+        assert_eq!(bench.slaves[0].outputs, [0, 0, 0, 42], "outputs come with the first exchange");
+        let slave = bench.master().slave(7).unwrap();
+        assert_eq!((slave.state, slave.losses), (SlaveState::DataExchange, losses));
+        assert!(!slave.parameters_waiting && slave.user_parameters.len() == length);
+        assert_eq!(bench.events(), [Event::Configured { address: 7 }]);
+    }
+    assert_eq!(bench.master().slave(8).unwrap().losses, 0);
+    assert_eq!(bench.slaves[1].parameters.len(), 17);
+    assert!(bench.master().set_user_parameters(7, vec![0; 238]).is_err());
+    assert!(bench.master().set_user_parameters(9, Vec::new()).is_err());
+}
+
+#[test]
 fn parameters_configuration_and_groups_are_those_of_the_settings_whatever_their_length() {
     for (parameters, identifiers) in [(0, 1), (10, 6), (18, 2), (237, 244)] {
         let mut slave = Scripted::new(7);

@@ -121,7 +121,7 @@ impl Source<'_> {
 }
 
 /// Why a product cannot suffer a fault.
-fn cannot_suffer(
+pub(crate) fn cannot_suffer(
     lever: Lever,
     product: &Product,
     sensor: &SensorPlan,
@@ -158,6 +158,35 @@ pub(crate) fn fault_of_words(
     product: &Product,
     sensor: &SensorPlan,
 ) -> Result<Fault, String> {
+    let (at, lever) = table_of_words(words)?;
+    match cannot_suffer(lever, product, sensor, false) {
+        Some(message) => Err(message),
+        None => Ok(Fault { at, lever }),
+    }
+}
+
+/// The fault in words that begins now, `jump steps=4000`, for `product` with `sensor`.
+///
+/// # Errors
+/// What is wrong, as one sentence.
+pub(crate) fn lever_of_words(
+    words: &str,
+    product: &Product,
+    sensor: &SensorPlan,
+    on_virtual_bus: bool,
+) -> Result<Lever, String> {
+    if words.split_whitespace().any(|word| word.starts_with("at=")) {
+        return Err("a fault that is asked for begins now: leave out at=".to_owned());
+    }
+    let (_, lever) = table_of_words(&format!("{words} at=0s"))?;
+    match cannot_suffer(lever, product, sensor, on_virtual_bus) {
+        Some(message) => Err(message),
+        None => Ok(lever),
+    }
+}
+
+/// When words say that a fault begins, and what it does.
+fn table_of_words(words: &str) -> Result<(Instant, Lever), String> {
     let mut words = words.split_whitespace();
     let kind = words.next().ok_or("say what goes wrong, as in 'jump steps=4000 at=5s'")?;
     let mut keys = vec![("kind", kind)];
@@ -170,10 +199,7 @@ pub(crate) fn fault_of_words(
         toml::from_str(&text).map_err(|error| super::in_our_words(error.message()))?;
     let source = Source { text: &text, name: "", folder: std::path::Path::new("") };
     let lever = source.lever(&table).map_err(|complaint| complaint.message().to_owned())?;
-    match cannot_suffer(lever, product, sensor, false) {
-        Some(message) => Err(message),
-        None => Ok(Fault { at: Instant::ZERO + table.at.0, lever }),
-    }
+    Ok((Instant::ZERO + table.at.0, lever))
 }
 
 /// The keys that a fault has besides `at` and `kind`.

@@ -1,10 +1,14 @@
 //! DeviceNet in a plant.
 
+mod changes;
 mod composite;
+mod objects;
 mod plan;
 mod scanner;
 
-use codewheel_capture::{self as capture, BusRecorder, Direction};
+use std::sync::Arc;
+
+use codewheel_capture::{self as capture, Direction};
 use codewheel_device::{DeviceNetEncoder, Event, Factory, Snapshot, product};
 use codewheel_devicenet::scanner::Scanner;
 use codewheel_encoder::{Kept, Start};
@@ -16,10 +20,14 @@ use codewheel_station::{Duration, Instant};
 
 use self::composite::Composite;
 use crate::crew::{Medium, Member};
-use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
+use crate::ears::Ears;
+use crate::field_bus::{Begun, Change, FieldBus, Line, Outfit, Powered, Shared, Switches};
 use crate::recording::Frames;
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, MemoryError, StartError};
+use crate::{
+    BusPlan, DipSwitch, MemoryError, ObjectGroup, Refusal, RotarySwitch, StartError,
+    SwitchPositions,
+};
 
 pub use plan::{Exchange, MasterPlan, SlavePlan};
 
@@ -46,6 +54,45 @@ impl FieldBus for DeviceNet {
     type Port = Box<dyn CanPort>;
     type Loop = Loop;
 
+    const ROTARY: [RotarySwitch; 2] = [
+        RotarySwitch { label: "1", meaning: "tens of the MAC ID", delivered: 0 },
+        RotarySwitch { label: "2", meaning: "units of the MAC ID", delivered: 0 },
+    ];
+    const DIP: &'static [DipSwitch] = &[
+        DipSwitch { label: "1", meaning: "not used", delivered: false },
+        DipSwitch {
+            label: "2",
+            meaning: "bit rate: 2 and 3 OFF OFF 125k, OFF ON 250k, ON OFF 500k",
+            delivered: false,
+        },
+        DipSwitch {
+            label: "3",
+            meaning: "bit rate: 2 and 3 OFF OFF 125k, OFF ON 250k, ON OFF 500k",
+            delivered: false,
+        },
+    ];
+
+    fn bit_rates() -> Vec<String> {
+        BitRate::ALL.iter().map(ToString::to_string).collect()
+    }
+
+    fn rate_apart(switches: &Self::Switches, rate: BitRate) -> Option<BitRate> {
+        Some(switches.bit_rate()).filter(|switched| *switched != rate)
+    }
+
+    /// They are the device's own.
+    fn settings_fixed(_: bool) -> Option<&'static str> {
+        None
+    }
+
+    fn objects(
+        outfit: &Outfit<Self>,
+        encoder: Option<&Self::Encoder>,
+        _: Option<(&Scanner, u8)>,
+    ) -> Vec<ObjectGroup> {
+        objects::objects(outfit, encoder.map(Troubled::station))
+    }
+
     fn make_master(plan: &MasterPlan, place: usize) -> Result<Scanner, StartError> {
         Ok(scanner::scanner(plan, place))
     }
@@ -70,8 +117,8 @@ impl FieldBus for DeviceNet {
         capture::Bus::devicenet(&plan.name, plan.bit_rate)
     }
 
-    fn record(drive: &mut Loop, recorder: Option<BusRecorder>, _: BitRate) {
-        drive.set_tap(recorder.map(|recorder| Box::new(Frames(recorder)) as Box<dyn Tap>));
+    fn listen(drive: &mut Loop, ears: Option<Arc<Ears>>, _: BitRate) {
+        drive.set_tap(ears.map(|ears| Box::new(Frames(ears)) as Box<dyn Tap>));
     }
 }
 
@@ -87,6 +134,19 @@ impl Switches for codewheel_device::Switches {
     fn termination(&self) -> bool {
         self.termination
     }
+
+    fn positions(&self) -> SwitchPositions {
+        let Self { rotary_1, rotary_2, dip_2, dip_3, termination } = *self;
+        let dip = vec![false, dip_2, dip_3];
+        SwitchPositions { rotary: [rotary_1, rotary_2], dip, termination }
+    }
+
+    fn at(positions: &SwitchPositions) -> Self {
+        let [rotary_1, rotary_2] = positions.rotary;
+        let dip = |number: usize| positions.dip.get(number - 1).copied().unwrap_or_default();
+        let termination = positions.termination;
+        Self { rotary_1, rotary_2, dip_2: dip(2), dip_3: dip(3), termination }
+    }
 }
 
 impl Powered<DeviceNet> for Troubled<DeviceNetEncoder<PlantSensor>> {
@@ -101,6 +161,10 @@ impl Powered<DeviceNet> for Troubled<DeviceNetEncoder<PlantSensor>> {
         let factory = Factory::with_serial(*serial);
         let encoder = DeviceNetEncoder::power_up(now, product, factory, *switches, memory, sensor);
         Self::new(encoder, seed)
+    }
+
+    fn sensor(&self) -> &PlantSensor {
+        self.station().sensor()
     }
 
     fn sensor_mut(&mut self) -> &mut PlantSensor {
@@ -121,6 +185,18 @@ impl Powered<DeviceNet> for Troubled<DeviceNetEncoder<PlantSensor>> {
 
     fn snapshot(&self, now: Instant) -> Snapshot {
         self.station().snapshot(now)
+    }
+
+    fn set_switches(&mut self, switches: codewheel_device::Switches) {
+        self.station_mut().set_switches(switches);
+    }
+
+    fn change(&mut self, now: Instant, change: Change<'_>) -> Result<Begun, Refusal> {
+        changes::change(self.station_mut(), now, change)
+    }
+
+    fn is_saving(&self) -> bool {
+        self.station().is_saving()
     }
 
     fn drops(&self) -> Option<Drops> {
@@ -178,6 +254,10 @@ impl Line<DeviceNet> for Wire<Member<DeviceNet>> {
         Self::bus_off(self, id, &mut |_| {});
     }
 
+    fn set_terminated(&mut self, id: NodeId, terminated: bool) {
+        Self::set_terminated(self, id, terminated);
+    }
+
     fn set_corruption_at(&mut self, id: NodeId, probability: Option<f64>) {
         Self::set_corruption_at(self, id, probability);
     }
@@ -186,9 +266,9 @@ impl Line<DeviceNet> for Wire<Member<DeviceNet>> {
         Self::run_until(self, until, observer);
     }
 
-    fn record(event: &can::Event, recorder: &BusRecorder) {
+    fn record(event: &can::Event, ears: &Ears) {
         if let can::Event::Frame { at, frame, .. } = event {
-            recorder.frame(*at, frame, Direction::Received);
+            ears.frame(*at, frame, Direction::Received);
         }
     }
 

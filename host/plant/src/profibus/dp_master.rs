@@ -5,17 +5,16 @@ use std::collections::VecDeque;
 use codewheel_commission::profibus::{
     self, Diagnosis, Event, Master, SettingsError, SlaveView, Timeless,
 };
+use codewheel_encoder::Model;
 use codewheel_station::rs485::{BaudRate, Input, Node, Transmission};
 use codewheel_station::{Instant, Station};
 
-use super::{DpMasterPlan, PresetPlan, Profibus};
-use crate::field_bus::{Seen, Talker, Told};
+use super::presets::Presetting;
+use super::{DpMasterPlan, Profibus};
+use crate::field_bus::{Begun, Change, Seen, Talker, Told};
 use crate::repeats::Repeats;
 use crate::snapshot::{self, CycleTimes, SlaveState};
-
-/// Data exchanges in which outputs are surely seen once: the first of them may have been under way
-/// already.
-const SEEN: u64 = 2;
+use crate::{Cause, Refusal};
 
 /// What waits to be fetched of what the master tells; beyond it the oldest gives way.
 const TOLD: usize = 256;
@@ -23,33 +22,23 @@ const TOLD: usize = 256;
 /// A DP master with its agenda of presets.
 #[derive(Debug)]
 pub struct DpMaster {
-    master: Timeless<Master>,
-    agenda: Vec<Presetting>,
+    pub(super) master: Timeless<Master>,
+    pub(super) planned: Vec<Planned>,
+    pub(super) agenda: Vec<Presetting>,
+    /// The number of the next preset that somebody asks for.
+    pub(super) next_preset: u64,
     repeats: Repeats<Event>,
     told: VecDeque<Told>,
 }
 
-/// The presets of one slave.
+/// What the plan says of a slave.
 #[derive(Debug)]
-struct Presetting {
-    address: u8,
+pub(super) struct Planned {
+    pub(super) address: u8,
     /// The octets of its outputs.
-    outputs: u8,
-    waiting: VecDeque<PresetPlan>,
-    clock: ClockBit,
-}
-
-/// Where the top bit of the outputs stands (PROFIBUS manual §7.4), and since which answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ClockBit {
-    /// The slave exchanges no data, or did not a moment ago.
-    Unknown,
-    Low {
-        since: u64,
-    },
-    High {
-        since: u64,
-    },
+    pub(super) outputs: u8,
+    /// The user octets of its Set_Prm.
+    pub(super) user_parameters: Vec<u8>,
 }
 
 impl DpMaster {
@@ -58,21 +47,30 @@ impl DpMaster {
     /// # Errors
     /// [`SettingsError`] for settings that no master can have.
     pub(super) fn new(plan: &DpMasterPlan) -> Result<Self, SettingsError> {
-        let slaves = plan.slaves.iter().map(super::DpSlavePlan::settings).collect();
-        let master = Master::new(plan.settings.clone(), slaves)?;
-        let presets = plan.slaves.iter().filter(|slave| !slave.presets.is_empty());
-        let agenda = presets.map(|slave| Presetting {
+        let slaves: Vec<_> = plan.slaves.iter().map(super::DpSlavePlan::settings).collect();
+        let planned = plan.slaves.iter().zip(&slaves).map(|(slave, settings)| Planned {
             address: slave.address,
             outputs: slave.configuration.outputs,
-            waiting: slave.presets.iter().copied().collect(),
-            clock: ClockBit::Unknown,
+            user_parameters: settings.user_parameters.clone(),
+        });
+        let planned = planned.collect();
+        let presets = plan.slaves.iter().filter(|slave| !slave.presets.is_empty());
+        let agenda = presets.map(|slave| {
+            Presetting::new(slave.address, slave.configuration.outputs, &slave.presets)
         });
         Ok(Self {
+            planned,
             agenda: agenda.collect(),
-            master: Timeless::new(master),
+            next_preset: 0,
+            master: Timeless::new(Master::new(plan.settings.clone(), slaves)?),
             repeats: Repeats::new(),
             told: VecDeque::new(),
         })
+    }
+
+    /// The user octets of Set_Prm that the slave at `address` gets.
+    pub(super) fn user_parameters(&self, address: u8) -> Option<&[u8]> {
+        Some(self.master.station().slave(address)?.user_parameters)
     }
 
     /// Hears what the master has to tell, and moves the presets on.
@@ -93,54 +91,6 @@ impl DpMaster {
             presetting.tend(now, master);
         }
         self.agenda.retain(|presetting| !presetting.is_done());
-    }
-}
-
-impl Presetting {
-    fn is_done(&self) -> bool {
-        self.waiting.is_empty() && matches!(self.clock, ClockBit::Low { .. })
-    }
-
-    fn tend(&mut self, now: Instant, master: &mut Master) {
-        let Some(slave) = master.slave(self.address) else { return };
-        let answers = slave.answers;
-        if slave.state != profibus::SlaveState::DataExchange {
-            if self.clock != ClockBit::Unknown {
-                // A preset whose fate is unknown stands at the head still, and is given again.
-                self.clock = ClockBit::Unknown;
-                self.put(master, 0, false);
-            }
-            return;
-        }
-        match self.clock {
-            // The slave must see the bit low first (decision: it counts as high at the entry).
-            ClockBit::Unknown => self.clock = ClockBit::Low { since: answers },
-            ClockBit::Low { since } if answers >= since + SEEN => {
-                if let Some(preset) = self.waiting.front().filter(|preset| preset.at <= now) {
-                    let value = preset.value;
-                    self.put(master, value, true);
-                    self.clock = ClockBit::High { since: answers };
-                }
-            }
-            ClockBit::High { since } if answers >= since + SEEN => {
-                let value = self.waiting.pop_front().map_or(0, |preset| preset.value);
-                self.put(master, value, false);
-                self.clock = ClockBit::Low { since: answers };
-            }
-            ClockBit::Low { .. } | ClockBit::High { .. } => {}
-        }
-    }
-
-    /// Gives the slave a preset, its top bit set or not.
-    fn put(&self, master: &mut Master, value: u32, clock: bool) {
-        let wide = value | u32::from(clock) << 31;
-        let narrow = value as u16 | u16::from(clock) << 15;
-        // A plan gives presets only to configurations that carry them.
-        let _ = match self.outputs {
-            4 => master.set_outputs(self.address, &wide.to_be_bytes()),
-            2 => master.set_outputs(self.address, &narrow.to_be_bytes()),
-            _ => Ok(()),
-        };
     }
 }
 
@@ -202,6 +152,43 @@ impl Talker<Profibus> for DpMaster {
 
     fn take_event(&mut self) -> Option<Told> {
         self.told.pop_front()
+    }
+
+    fn change(
+        &mut self,
+        now: Instant,
+        address: u8,
+        model: Model,
+        change: Change<'_>,
+    ) -> Option<Result<Begun, Refusal>> {
+        let place = self.planned.iter().position(|planned| planned.address == address)?;
+        Some(self.change_slave(now, place, model, change))
+    }
+
+    fn ended(&self, address: u8, begun: &Begun) -> Option<Result<(), Refusal>> {
+        let slave = self.master.station().slave(address)?;
+        match begun {
+            Begun::Presetting(id, _) => {
+                let waits = self.agenda.iter().any(|presetting| presetting.waits(*id));
+                (!waits).then_some(Ok(()))
+            }
+            Begun::Parameterizing(_) if slave.parameters_waiting => None,
+            Begun::Parameterizing(_) => match slave.state {
+                profibus::SlaveState::DataExchange => Some(Ok(())),
+                profibus::SlaveState::ParameterError | profibus::SlaveState::ConfigurationError => {
+                    let text = "the device refuses what its master sends now: look at its reports";
+                    Some(Err(Refusal::new(Cause::Failed, text)))
+                }
+                profibus::SlaveState::Absent | profibus::SlaveState::Configuring => None,
+            },
+            Begun::Done(_) | Begun::Saving(_) => Some(Ok(())),
+        }
+    }
+
+    fn give_up(&mut self, _: u8, begun: &Begun) {
+        if let Begun::Presetting(id, _) = begun {
+            self.agenda.iter_mut().for_each(|presetting| presetting.forget(*id));
+        }
     }
 }
 

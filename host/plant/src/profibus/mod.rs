@@ -1,13 +1,18 @@
 //! PROFIBUS-DP in a plant.
 
+mod changes;
 mod composite;
 mod dp_master;
+mod objects;
 mod plan;
+mod presets;
 
-use codewheel_capture::{self as capture, BusRecorder, Condition, Direction};
+use std::sync::Arc;
+
+use codewheel_capture::{self as capture, Condition, Direction};
 use codewheel_device::profibus::Factory;
 use codewheel_device::{Event, ProfibusEncoder, Snapshot, product};
-use codewheel_encoder::{Kept, Model, Start};
+use codewheel_encoder::{Kept, Start};
 use codewheel_link::{
     BusUri, Clock, LinkError, Notice, Rs485Loop, Rs485Port, Rs485Tap, Waker, open_rs485,
 };
@@ -21,10 +26,14 @@ use self::composite::Composite;
 use self::dp_master::DpMaster;
 use crate::check::baud_rate;
 use crate::crew::{Medium, Member};
-use crate::field_bus::{FieldBus, Line, Outfit, Powered, Shared, Switches};
+use crate::ears::Ears;
+use crate::field_bus::{Begun, Change, FieldBus, Line, Outfit, Powered, Shared, Switches};
 use crate::recording::Telegrams;
 use crate::sensor::PlantSensor;
-use crate::{BusPlan, MemoryError, StartError};
+use crate::{
+    BusPlan, Cause, DipSwitch, MemoryError, ObjectGroup, Refusal, RotarySwitch, StartError,
+    SwitchPositions,
+};
 
 pub use plan::{DeviceOptions, DpMasterPlan, DpSlavePlan, PresetPlan};
 
@@ -66,6 +75,33 @@ impl FieldBus for Profibus {
     type Port = Box<dyn Rs485Port>;
     type Loop = Rs485Loop;
 
+    const ROTARY: [RotarySwitch; 2] = [
+        RotarySwitch { label: "1", meaning: "tens of the station address", delivered: 0 },
+        RotarySwitch { label: "2", meaning: "units of the station address", delivered: 0 },
+    ];
+    const DIP: &'static [DipSwitch] = &[];
+
+    fn bit_rates() -> Vec<String> {
+        BaudRate::ALL.iter().map(ToString::to_string).collect()
+    }
+
+    fn rate_apart(_: &Self::Switches, _: BaudRate) -> Option<BaudRate> {
+        None
+    }
+
+    fn settings_fixed(is_served: bool) -> Option<&'static str> {
+        (!is_served).then_some(objects::NOT_SERVED)
+    }
+
+    fn objects(
+        outfit: &Outfit<Self>,
+        encoder: Option<&Self::Encoder>,
+        master: Option<(&DpMaster, u8)>,
+    ) -> Vec<ObjectGroup> {
+        let told = master.and_then(|(master, address)| master.user_parameters(address));
+        objects::objects(outfit, encoder.map(Troubled::station), told)
+    }
+
     fn make_master(plan: &DpMasterPlan, _: usize) -> Result<DpMaster, StartError> {
         Ok(DpMaster::new(plan)?)
     }
@@ -96,9 +132,9 @@ impl FieldBus for Profibus {
         capture::Bus { bits_per_second, ..bus }
     }
 
-    fn record(drive: &mut Rs485Loop, recorder: Option<BusRecorder>, rate: BaudRate) {
-        let tap = |recorder| Box::new(Telegrams::new(recorder, rate)) as Box<dyn Rs485Tap>;
-        drive.set_tap(recorder.map(tap));
+    fn listen(drive: &mut Rs485Loop, ears: Option<Arc<Ears>>, rate: BaudRate) {
+        let tap = |ears| Box::new(Telegrams::new(ears, rate)) as Box<dyn Rs485Tap>;
+        drive.set_tap(ears.map(tap));
     }
 }
 
@@ -114,6 +150,16 @@ impl Switches for codewheel_device::profibus::Switches {
     fn termination(&self) -> bool {
         self.termination
     }
+
+    fn positions(&self) -> SwitchPositions {
+        let Self { rotary_1, rotary_2, termination } = *self;
+        SwitchPositions { rotary: [rotary_1, rotary_2], dip: Vec::new(), termination }
+    }
+
+    fn at(positions: &SwitchPositions) -> Self {
+        let [rotary_1, rotary_2] = positions.rotary;
+        Self { rotary_1, rotary_2, termination: positions.termination }
+    }
 }
 
 impl Powered<Profibus> for Troubled<ProfibusEncoder<PlantSensor>> {
@@ -125,15 +171,18 @@ impl Powered<Profibus> for Troubled<ProfibusEncoder<PlantSensor>> {
         seed: u64,
     ) -> Self {
         let Outfit { product, switches, options, rate, simulated, serial, .. } = outfit;
-        let geometry = outfit.sensor.geometry().unwrap_or(product.encoder.geometry);
         let factory = Factory {
-            model: Model { geometry, ..product.encoder },
+            model: outfit.model(),
             serial: *serial,
             baud: if options.auto_baud { Baud::Search } else { Baud::Fixed(*rate) },
             timing: if *simulated { Timing::Exact } else { Timing::Coarse },
         };
         let encoder = ProfibusEncoder::power_up(now, product, factory, *switches, memory, sensor);
         Self::new(encoder, seed)
+    }
+
+    fn sensor(&self) -> &PlantSensor {
+        self.station().sensor()
     }
 
     fn sensor_mut(&mut self) -> &mut PlantSensor {
@@ -154,6 +203,28 @@ impl Powered<Profibus> for Troubled<ProfibusEncoder<PlantSensor>> {
 
     fn snapshot(&self, now: Instant) -> Snapshot {
         self.station().snapshot(now)
+    }
+
+    fn set_switches(&mut self, switches: codewheel_device::profibus::Switches) {
+        self.station_mut().set_switches(switches);
+    }
+
+    /// Only its master can, and this plant has none that serves it.
+    fn change(&mut self, _: Instant, change: Change<'_>) -> Result<Begun, Refusal> {
+        let what = match change {
+            Change::Preset(_) => "a preset comes",
+            _ => "parameters come",
+        };
+        let text = format!(
+            "nothing was changed: on PROFIBUS {what} from the master, and no master of this plant \
+             serves the device at this address; change it there"
+        );
+        Err(Refusal::new(Cause::Impossible, text))
+    }
+
+    /// Nobody asks for it on this bus.
+    fn is_saving(&self) -> bool {
+        false
     }
 
     fn drops(&self) -> Option<Drops> {
@@ -221,6 +292,10 @@ impl Line<Profibus> for Wire<Member<Profibus>> {
         // A plan has this for CAN only: an RS-485 station has no controller that gives up.
     }
 
+    fn set_terminated(&mut self, id: NodeId, terminated: bool) {
+        Self::set_terminated(self, id, terminated);
+    }
+
     fn set_corruption_at(&mut self, id: NodeId, probability: Option<f64>) {
         Self::set_corruption_at(self, id, probability);
     }
@@ -229,10 +304,10 @@ impl Line<Profibus> for Wire<Member<Profibus>> {
         Self::run_until(self, until, observer);
     }
 
-    fn record(event: &rs485::Event, recorder: &BusRecorder) {
+    fn record(event: &rs485::Event, ears: &Ears) {
         if let rs485::Event::Telegram { octets, end, intact, .. } = event {
             let condition = if *intact { Condition::Intact } else { Condition::Broken };
-            recorder.telegram(*end, octets.octets(), condition, Direction::Received);
+            ears.telegram(*end, octets.octets(), condition, Direction::Received);
         }
     }
 

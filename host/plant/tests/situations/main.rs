@@ -1,5 +1,6 @@
 //! Plants as their users meet them: files, faults, ports.
 
+mod commands;
 mod complaints;
 mod connections;
 mod examples;
@@ -10,6 +11,7 @@ mod power_cuts;
 mod profibus;
 mod recording;
 mod running;
+mod watching;
 
 use std::path::{Path, PathBuf};
 

@@ -55,6 +55,24 @@ impl<S: Sensor> Faulty<S> {
         self.disturbed = true;
     }
 
+    /// Whether it holds its code.
+    #[must_use]
+    pub const fn is_stuck(&self) -> bool {
+        self.stuck
+    }
+
+    /// Whether the voltage of the lithium cell was set too low.
+    #[must_use]
+    pub const fn is_cell_low(&self) -> bool {
+        self.cell_low
+    }
+
+    /// How far the code has jumped, in steps modulo the number of codes.
+    #[must_use]
+    pub const fn jumped(&self) -> u32 {
+        self.jumped
+    }
+
     /// The sensor behind the faults.
     pub const fn sensor(&self) -> &S {
         &self.sensor

@@ -90,6 +90,14 @@ impl Profile {
         Self { points, repeat }
     }
 
+    /// The angle of the last point, where it rests there.
+    pub(super) fn end(&self) -> Option<i128> {
+        if self.repeat.is_some() {
+            return None;
+        }
+        self.points.last().map(|point| point.angle)
+    }
+
     fn angle(&self, time: Duration) -> i128 {
         match self.repeat {
             Some(Repeat { period, advance }) => {

@@ -111,6 +111,43 @@ fn a_new_motion_goes_on_where_the_shaft_is() {
     assert_eq!(after.code(millis(1_500)), S);
 }
 
+#[test]
+fn a_shaft_that_is_turned_goes_evenly_and_rests_so_many_steps_further() {
+    let before = shaft("turn rpm=60");
+    let now = millis(1_250);
+    let turned = before.turned(now, -1_000, Duration::from_millis(50));
+    assert_eq!(turned.code(now), S + 2048);
+    assert_eq!(turned.code(millis(1_275)), S + 2048 - 500);
+    assert_eq!(turned.steps_left(millis(1_275)), -500);
+    assert!(turned.moves_from(millis(1_299)) && !turned.moves_from(millis(1_300)));
+    assert_eq!(turned.code(seconds(99)), S + 2048 - 1_000);
+    assert_eq!(turned.steps_left(seconds(99)), 0);
+    assert_eq!(before.turned(now, 7, Duration::ZERO).code(now), S + 2048 + 7);
+}
+
+#[test]
+fn turning_adds_up_to_the_step_whatever_fraction_of_one_it_is_broken_off_at() {
+    let mut turned = shaft("turn rpm=0.001");
+    let (mut now, begin) = (millis(12_345), turned.code(millis(12_345)));
+    for _ in 0..1_000 {
+        let steps = turned.steps_left(now) + 3;
+        turned = turned.turned(now, steps, Duration::from_micros(50_000));
+        now += Duration::from_micros(7_777);
+    }
+    assert_eq!(turned.code(seconds(60)), begin + 3_000);
+}
+
+#[test]
+fn a_shaft_that_is_held_rests_and_another_motion_goes_on_from_there() {
+    let turning = shaft("turn rpm=60");
+    let held = turning.held(millis(1_250));
+    assert_eq!((held.code(seconds(9)), held.moves_from(seconds(2))), (S + 2048, false));
+    let on = shaft("turn rpm=-60 angle=7").going_on_from(&held, seconds(9));
+    assert_eq!(on.code(seconds(9)), S + 2048);
+    assert_eq!(on.code(seconds(9) + Duration::from_millis(250)), S);
+    assert_eq!(on.steps_left(seconds(9)), 0, "it never rests");
+}
+
 fn file(text: &str) -> tempfile::NamedTempFile {
     let mut file = tempfile::Builder::new().prefix("a shaft ").tempfile().unwrap();
     file.write_all(text.as_bytes()).unwrap();
