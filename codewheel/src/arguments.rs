@@ -1,5 +1,7 @@
 //! The command line.
 
+pub(crate) mod commission;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
@@ -7,6 +9,11 @@ use codewheel_device::Product;
 use codewheel_link::BusUri;
 use codewheel_plant::TimeSpan;
 
+use self::commission::{
+    ApplyArguments, BackupArguments, DiffArguments, GetArguments, IdentifyArguments,
+    PassportArguments, PresetArguments, RESET_EXAMPLES, RESTORE_EXAMPLES, SAVE_EXAMPLES,
+    ScanArguments, ServiceArguments, SetArguments, WatchArguments,
+};
 use crate::page::PageArguments;
 
 /// An absolute rotary encoder made of software.
@@ -57,6 +64,25 @@ impl Arguments {
 pub(crate) enum Verb {
     Run(RunArguments),
     Encoder(Box<EncoderArguments>),
+    Scan(ScanArguments),
+    Identify(IdentifyArguments),
+    Get(GetArguments),
+    Set(SetArguments),
+    Preset(PresetArguments),
+    /// Keep the settings in force over a power-off (DeviceNet).
+    #[command(after_help = SAVE_EXAMPLES)]
+    Save(ServiceArguments),
+    /// Bring back the settings that were saved (DeviceNet).
+    #[command(after_help = RESTORE_EXAMPLES)]
+    Restore(ServiceArguments),
+    /// Bring back the settings of the factory; what was saved stays saved (DeviceNet).
+    #[command(after_help = RESET_EXAMPLES)]
+    Reset(ServiceArguments),
+    Watch(WatchArguments),
+    Backup(BackupArguments),
+    Diff(DiffArguments),
+    Apply(ApplyArguments),
+    Passport(PassportArguments),
     Replay(ReplayArguments),
     Models(ModelsArguments),
     Describe(DescribeArguments),
@@ -70,6 +96,8 @@ pub(crate) enum Verb {
     Doctor(DoctorArguments),
     /// Print the JSON Schema of plant files, for editors that complete and check them.
     Schema,
+    Completions(CompletionsArguments),
+    Man(ManArguments),
 }
 
 /// Run a plant: buses, devices, shafts, memories, faults and masters from one TOML file.
@@ -357,6 +385,29 @@ pub(crate) struct DoctorArguments {
     /// One JSON object a line, for each finding
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Print what makes a shell complete the verbs and options of this program.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel completions bash > ~/.local/share/bash-completion/completions/codewheel
+  codewheel completions zsh > ~/.zfunc/_codewheel
+  codewheel completions fish > ~/.config/fish/completions/codewheel.fish")]
+pub(crate) struct CompletionsArguments {
+    /// The shell
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// Print the manual page of this program, or write those of all verbs into a folder.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  codewheel man | man -l -
+  codewheel man -o ~/.local/share/man/man1")]
+pub(crate) struct ManArguments {
+    #[command(flatten)]
+    pub(crate) output: OutputArguments,
 }
 
 fn parse_model(text: &str) -> Result<&'static Product, String> {

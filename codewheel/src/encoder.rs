@@ -11,11 +11,10 @@ use codewheel_plant::{
     Report, SensorPlan,
 };
 use codewheel_sim::shaft::Shaft;
-use codewheel_station::can::BitRate;
-use codewheel_station::rs485::BaudRate;
 
 use crate::arguments::{Chatter, EncoderArguments};
 use crate::failure::Failure;
+use crate::rates;
 use crate::record;
 use crate::signals::stop_flag;
 use crate::tell;
@@ -30,13 +29,7 @@ pub(crate) fn run(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), 
 fn devicenet(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failure> {
     joins(arguments, Medium::Can)?;
     let address = address(arguments, 63, "DeviceNet has 0–63")?;
-    let rate = match &arguments.baud {
-        None => BitRate::Kbit125,
-        Some(text) => BitRate::ALL
-            .into_iter()
-            .find(|rate| rate.to_string().eq_ignore_ascii_case(text))
-            .ok_or_else(|| no_rate(text, "125k, 250k and 500k"))?,
-    };
+    let rate = rates::devicenet(arguments.baud.as_deref())?;
     let device = device(arguments, Switches::set_to(address, rate))?;
     let plan = BusPlan::<DeviceNet>::new(name(&arguments.bus), arguments.bus.clone(), rate);
     play(arguments, plan, device, chatter)
@@ -45,13 +38,7 @@ fn devicenet(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failu
 fn profibus(arguments: &EncoderArguments, chatter: Chatter) -> Result<(), Failure> {
     joins(arguments, Medium::Rs485)?;
     let address = address(arguments, 99, "the switches of a PROFIBUS encoder have 0–99")?;
-    let rate = match &arguments.baud {
-        None => BaudRate::Mbit1_5,
-        Some(text) => Profibus::rate(text).ok_or_else(|| {
-            let rates: Vec<_> = BaudRate::ALL.iter().map(ToString::to_string).collect();
-            no_rate(text, &rates.join(", "))
-        })?,
-    };
+    let rate = rates::profibus(arguments.baud.as_deref())?;
     let device = device(arguments, profibus::Switches::set_to(address))?;
     // A serial port runs at some rate, which nobody need know.
     let auto_baud = arguments.baud.is_none() && matches!(arguments.bus, BusUri::Rs485Device(_));
@@ -98,10 +85,6 @@ fn address(arguments: &EncoderArguments, highest: u8, range: &str) -> Result<u8,
     address.ok_or_else(|| {
         Failure::Usage(format!("invalid value '{text}' for '--address <N>': {range}"))
     })
-}
-
-fn no_rate(text: &str, rates: &str) -> Failure {
-    Failure::Usage(format!("invalid value '{text}' for '--baud <RATE>': the rates are {rates}"))
 }
 
 fn device<B: FieldBus>(

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use codewheel_capture::{ReadError, WriteError};
+use codewheel_commission::passport::FileError;
+use codewheel_commission::{Kind, Trouble};
 use codewheel_dashboard::StartError as PageError;
 use codewheel_link::LinkError;
 use codewheel_plant::{MemoryError, PlantError, RecordError, StartError};
@@ -42,6 +44,24 @@ pub(crate) enum Failure {
         /// Why it cannot be read.
         reason: ReadError,
     },
+    #[error("cannot read {}: {reason}; check its name and its rights", .path.display())]
+    Read {
+        /// What was to be read.
+        path: PathBuf,
+        /// What the system said.
+        reason: io::Error,
+    },
+    #[error("{} is no passport that can be used:\n{}", .path.display(), .reason.to_string().trim_end())]
+    Passport {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        reason: FileError,
+    },
+    #[error(transparent)]
+    Trouble(#[from] Trouble),
+    #[error("interrupted")]
+    Interrupted,
     #[error("cannot write to stdout: {0}")]
     Output(#[from] io::Error),
     #[error("cannot catch Ctrl-C: {0}")]
@@ -54,10 +74,36 @@ impl Failure {
         matches!(self, Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
     }
 
-    /// 2 for usage, 3 for bus or I/O.
+    /// What kind it is, in a word for programs.
+    pub(crate) fn kind(&self) -> &'static str {
+        match self {
+            Self::Trouble(trouble) => match trouble.kind {
+                Kind::Differs => "differs",
+                Kind::Usage => "usage",
+                Kind::Bus => "bus",
+                Kind::Refused => "refused",
+                Kind::TimeOut => "time-out",
+            },
+            Self::Usage(_) | Self::Passport { .. } => "usage",
+            Self::Interrupted => "interrupted",
+            _ => "bus",
+        }
+    }
+
+    /// 1 for what is not as it should be, 2 for usage, 3 for bus or I/O, 4 for a refusal, 5 for a
+    /// time-out; 130 where a person ended it, as shells have it.
     pub(crate) fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
+            Self::Trouble(trouble) => match trouble.kind {
+                Kind::Differs => 1,
+                Kind::Usage => 2,
+                Kind::Bus => 3,
+                Kind::Refused => 4,
+                Kind::TimeOut => 5,
+            },
+            Self::Interrupted => 130,
             Self::Usage(_)
+            | Self::Passport { .. }
             | Self::Shaft(_)
             | Self::Plant(PlantError::Wrong(_))
             | Self::Page(PageError::NeedsToken(_))
@@ -73,6 +119,7 @@ impl Failure {
             | Self::Page(_)
             | Self::Link(_)
             | Self::File { .. }
+            | Self::Read { .. }
             | Self::Record(_)
             | Self::Replay { .. }
             | Self::Output(_)

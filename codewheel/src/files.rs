@@ -45,6 +45,12 @@ pub(crate) fn keep(
     Ok(())
 }
 
+/// Writes the file whole or not at all, whatever was there.
+pub(crate) fn replace(path: &Path, text: &[u8]) -> io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    write(folder.unwrap_or(Path::new(".")), path, text)
+}
+
 /// Writes the file whole or not at all.
 fn write(folder: &Path, path: &Path, text: &[u8]) -> io::Result<()> {
     let mut file = tempfile::Builder::new();

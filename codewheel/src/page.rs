@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use clap::Args;
-use codewheel_dashboard::{Dashboard, Settings, Token};
+use codewheel_dashboard::{Dashboard, Port, Settings, Token};
 use codewheel_plant::Running;
 
 use crate::arguments::Chatter;
@@ -45,17 +45,13 @@ impl PageArguments {
         given.into_iter().find_map(|(is_given, option)| is_given.then_some(option))
     }
 
-    /// Serves the page of `plant`, called `name`, unless it is not wanted.
+    /// Takes the port for the page of a plant called `name`, before anything is started; `None`
+    /// where no page is wanted.
     ///
     /// # Errors
     /// A page that was asked for and cannot be served. One that nobody asked for is left out, and
     /// that is said.
-    pub(crate) fn serve(
-        &self,
-        plant: &Arc<Running>,
-        name: &str,
-        chatter: Chatter,
-    ) -> Result<Option<Dashboard>, Failure> {
+    pub(crate) fn port(&self, name: &str) -> Result<Option<Port>, Failure> {
         if self.no_page {
             return Ok(None);
         }
@@ -65,13 +61,8 @@ impl PageArguments {
             token: self.token.clone(),
             read_only: self.read_only,
         };
-        match Dashboard::start(Arc::clone(plant), settings) {
-            Ok(page) => {
-                if chatter > Chatter::Quiet {
-                    eprintln!("codewheel: page http://{}", page.address());
-                }
-                Ok(Some(page))
-            }
+        match Port::take(settings) {
+            Ok(port) => Ok(Some(port)),
             Err(error) if self.given().is_some() => Err(error.into()),
             Err(error) => {
                 eprintln!("codewheel: {error}");
@@ -79,6 +70,22 @@ impl PageArguments {
             }
         }
     }
+}
+
+/// Serves the page of `plant` at `port`, and says where it is.
+///
+/// # Errors
+/// The system has no thread for it.
+pub(crate) fn serve(
+    plant: &Arc<Running>,
+    port: Port,
+    chatter: Chatter,
+) -> Result<Dashboard, Failure> {
+    let page = Dashboard::serve(Arc::clone(plant), port)?;
+    if chatter > Chatter::Quiet {
+        eprintln!("codewheel: page http://{}", page.address());
+    }
+    Ok(page)
 }
 
 fn parse_address(text: &str) -> Result<SocketAddr, String> {

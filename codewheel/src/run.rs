@@ -10,7 +10,7 @@ use codewheel_plant::{BusSnapshot, Plant, Running};
 
 use crate::arguments::{Chatter, RunArguments};
 use crate::failure::Failure;
-use crate::page::PageArguments;
+use crate::page::{self, PageArguments};
 use crate::record;
 use crate::show::{self, Show};
 use crate::signals::stop_flag;
@@ -63,6 +63,7 @@ fn play(
     chatter: Chatter,
 ) -> Result<(), Failure> {
     let stop = stop_flag(|| {})?;
+    let port = page.port(name)?;
     let mut show = show::choose(json, plant.buses.len());
     let crews: Vec<_> = plant
         .buses
@@ -86,7 +87,7 @@ fn play(
             eprintln!("codewheel: {name} on {uri}: {crew}");
         }
     }
-    let page = page.serve(&running, name, chatter)?;
+    let page = port.map(|port| page::serve(&running, port, chatter)).transpose()?;
     let until = lasts.and_then(|lasts| Instant::now().checked_add(lasts));
     let shown = watch(&running, show.as_mut(), until, &stop, chatter);
     drop(page);

@@ -1,5 +1,7 @@
 //! The program as its users meet it at the prompt.
 
+#[cfg(unix)]
+mod commission;
 mod data_sheets;
 mod demo;
 mod descriptions;
@@ -14,5 +16,6 @@ mod record;
 mod refusals;
 mod replay;
 mod run;
+mod shell;
 #[cfg(unix)]
 mod terminal;

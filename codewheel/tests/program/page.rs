@@ -83,9 +83,13 @@ fn a_page_for_others_needs_a_token_and_whoever_has_it_gets_in() {
 fn a_port_that_was_asked_for_and_is_taken_is_an_error_that_says_what_to_do() {
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = taken.local_addr().expect("bound").to_string();
-    let demo = example("demo.toml");
-    let output = codewheel(&["run", demo.to_str().expect("text"), "--listen", &address]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let plant = folder.path().join("plant.toml");
+    let device = "[[device]]\nmodel = \"amg11-d29\"\naddress = 5\nmemory = \"m\"\n";
+    std::fs::write(&plant, format!("[[bus]]\nname = \"b\"\n{device}")).expect("written");
+    let output = codewheel(&["run", plant.to_str().expect("text"), "--listen", &address]);
     assert_eq!(output.status.code(), Some(3));
+    assert!(!folder.path().join("m").exists(), "nothing was started");
     let message = stderr(&output);
     assert!(message.contains(&address) && message.contains("another port"), "{message}");
     assert!(output.stdout.is_empty());

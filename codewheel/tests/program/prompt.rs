@@ -77,6 +77,15 @@ impl Running {
         self.out = None;
     }
 
+    /// Reads away what it prints from now on, so that it never waits for us.
+    #[cfg(unix)]
+    pub(crate) fn ignore_stdout(&mut self) {
+        let out = self.out.take();
+        std::thread::spawn(move || {
+            out.map(|mut out| std::io::copy(&mut out, &mut std::io::sink()))
+        });
+    }
+
     /// The next line of its stdout.
     pub(crate) fn line(&mut self) -> String {
         let mut line = String::new();

@@ -182,7 +182,32 @@ fn help_and_version_are_no_errors() {
 
 #[test]
 fn the_help_of_every_verb_with_choices_has_examples() {
-    for verb in ["run", "encoder", "describe", "eds", "gsd", "hilo", "doctor", "replay"] {
+    let verbs = [
+        "run",
+        "encoder",
+        "describe",
+        "eds",
+        "gsd",
+        "hilo",
+        "doctor",
+        "replay",
+        "scan",
+        "identify",
+        "get",
+        "set",
+        "preset",
+        "save",
+        "restore",
+        "reset",
+        "watch",
+        "backup",
+        "diff",
+        "apply",
+        "passport",
+        "completions",
+        "man",
+    ];
+    for verb in verbs {
         let help = printed(&[verb, "--help"]);
         let example = format!("\n  codewheel {verb} ");
         assert!(help.contains("Examples:") && help.contains(&example), "{help}");

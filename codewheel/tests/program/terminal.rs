@@ -1,7 +1,7 @@
 //! The live table, on a terminal.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -13,7 +13,7 @@ use rustix::termios::{Winsize, tcsetwinsize};
 use crate::prompt::example;
 
 /// The program on a terminal of its own.
-struct Terminal {
+pub(crate) struct Terminal {
     child: Child,
     screen: File,
     seen: String,
@@ -21,6 +21,15 @@ struct Terminal {
 
 impl Terminal {
     fn start(arguments: &[&str], rows: u16) -> Self {
+        Self::start_with(arguments, rows, false)
+    }
+
+    /// Starts it with a keyboard.
+    pub(crate) fn start_with_keyboard(arguments: &[&str]) -> Self {
+        Self::start_with(arguments, 24, true)
+    }
+
+    fn start_with(arguments: &[&str], rows: u16, has_keyboard: bool) -> Self {
         let screen = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a terminal");
         grantpt(&screen).expect("ours");
         unlockpt(&screen).expect("ours");
@@ -30,7 +39,11 @@ impl Terminal {
         let open = || File::options().read(true).write(true).open(name.to_str().expect("text"));
         let child = Command::new(env!("CARGO_BIN_EXE_codewheel"))
             .args(arguments)
-            .stdin(Stdio::null())
+            .stdin(if has_keyboard {
+                Stdio::from(open().expect("the terminal"))
+            } else {
+                Stdio::null()
+            })
             .stdout(OwnedFd::from(open().expect("the terminal")))
             .stderr(OwnedFd::from(open().expect("the terminal")))
             .spawn()
@@ -46,7 +59,12 @@ impl Terminal {
         count > 0
     }
 
-    fn read_until(&mut self, text: &str) {
+    /// Presses the keys.
+    pub(crate) fn press(&mut self, keys: &str) {
+        self.screen.write_all(keys.as_bytes()).expect("the terminal");
+    }
+
+    pub(crate) fn read_until(&mut self, text: &str) {
         let deadline = Instant::now() + Duration::from_secs(20);
         while !self.seen.contains(text) {
             assert!(Instant::now() < deadline && self.read(), "no {text:?} in {}", self.seen);
@@ -54,12 +72,18 @@ impl Terminal {
     }
 
     /// Ends it, by `signal` or by itself, and gives all that was on the screen.
-    fn end(mut self, signal: Option<Signal>) -> String {
+    fn end(self, signal: Option<Signal>) -> String {
+        self.end_with(signal, 0)
+    }
+
+    /// [`end`](Self::end) with an exit code.
+    #[track_caller]
+    pub(crate) fn end_with(mut self, signal: Option<Signal>, code: i32) -> String {
         if let Some(signal) = signal {
             kill_process(Pid::from_child(&self.child), signal).expect("it lives");
         }
         while self.read() {}
-        assert_eq!(self.child.wait().expect("a child").code(), Some(0), "{}", self.seen);
+        assert_eq!(self.child.wait().expect("a child").code(), Some(code), "{}", self.seen);
         std::mem::take(&mut self.seen)
     }
 }

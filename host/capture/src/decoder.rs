@@ -8,7 +8,8 @@ mod replay;
 use self::devicenet::DeviceNet;
 use self::line::Line;
 use self::profibus::Profibus;
-use crate::{Bus, Condition, Content, Record};
+use crate::said::Listener;
+use crate::{Bus, Condition, Content, Record, Said};
 
 pub use self::replay::{Replayed, replay};
 
@@ -38,7 +39,7 @@ pub enum Assume {
 
 /// What a record says, in its parts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Said {
+pub struct Caption {
     /// The address of who said it, where that is known.
     pub from: Option<u8>,
     /// The address of whom it was said to, where that is known.
@@ -53,11 +54,13 @@ pub struct Said {
 ///
 /// It remembers what answers do not repeat: the request of a response, the fragments of a message, the
 /// ident number of a slave. So it wants all records of a bus in their order.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Decoder {
     output: Output,
     assume: Assume,
     buses: Vec<State>,
+    /// A line that nobody reads, since somebody hears what it says.
+    unread: Vec<u8>,
 }
 
 #[derive(Debug, Default)]
@@ -70,22 +73,31 @@ impl Decoder {
     /// A decoder that has seen nothing yet.
     #[must_use]
     pub const fn new(output: Output, assume: Assume) -> Self {
-        Self { output, assume, buses: Vec::new() }
+        Self { output, assume, buses: Vec::new(), unread: Vec::new() }
     }
 
     /// Appends the line of `record`, which was carried by `bus`, with its end of line.
     pub fn decode(&mut self, bus: &Bus, record: &Record<'_>, out: &mut Vec<u8>) {
-        if let Some(line) = self.line(self.output, bus, record, out) {
+        if let Some(line) = self.line(self.output, bus, record, out, Listener(None)) {
             line.end(&record.content);
         }
     }
 
     /// What `record` says, in its parts, whatever output was chosen.
     #[must_use]
-    pub fn say(&mut self, bus: &Bus, record: &Record<'_>) -> Said {
+    pub fn caption(&mut self, bus: &Bus, record: &Record<'_>) -> Caption {
         let mut out = Vec::with_capacity(128);
-        let line = self.line(Output::Text, bus, record, &mut out);
-        line.map(Line::into_said).unwrap_or_default()
+        let line = self.line(Output::Text, bus, record, &mut out, Listener(None));
+        line.map(Line::into_caption).unwrap_or_default()
+    }
+
+    /// Tells `listener` what `record` says, for programs that want the octets and not the names. Records
+    /// that say nothing by themselves, such as a request, tell nothing.
+    pub fn hear(&mut self, bus: &Bus, record: &Record<'_>, listener: &mut dyn FnMut(Said<'_>)) {
+        let mut out = std::mem::take(&mut self.unread);
+        out.clear();
+        self.line(self.output, bus, record, &mut out, Listener(Some(listener)));
+        self.unread = out;
     }
 
     /// The line of `record`, but for its end.
@@ -95,6 +107,7 @@ impl Decoder {
         bus: &Bus,
         record: &Record<'_>,
         out: &'o mut Vec<u8>,
+        listener: Listener<'o>,
     ) -> Option<Line<'o>> {
         let place = usize::from(record.bus);
         if self.buses.len() <= place {
@@ -102,7 +115,7 @@ impl Decoder {
         }
         let state = self.buses.get_mut(place)?;
         let assume = self.assume;
-        let mut line = Line::begin(out, output, bus, record);
+        let mut line = Line::begin(out, output, bus, record, listener);
         match &record.content {
             Content::Frame(frame) => {
                 let known = state.devicenet.get_or_insert_with(|| Box::new(DeviceNet::new(assume)));

@@ -6,7 +6,7 @@
 //! | [`Writer`] | writes a file in place, for whoever has the time |
 //! | [`Framer`] | makes telegrams of the octets that an RS-485 port brings |
 //! | [`Reader`] | reads a file record by record |
-//! | [`Decoder`] | names what a record says, as text or as JSON, live or from a file |
+//! | [`Decoder`] | names what a record says, as text or as JSON, live or from a file; tells programs what was [`Said`] |
 //!
 //! # Formats
 //! The suffix of a file says its [`Format`]:
@@ -37,13 +37,15 @@ mod lines;
 mod reader;
 mod record;
 mod recorder;
+mod said;
 mod writer;
 
 pub use bus::{Bus, Medium};
-pub use decoder::{Assume, Decoder, Output, Replayed, Said, replay};
+pub use decoder::{Assume, Caption, Decoder, Output, Replayed, replay};
 pub use format::{Format, FormatError};
 pub use framer::Framer;
 pub use reader::{Damage, Place, ReadError, Reader};
 pub use record::{Condition, Content, Direction, Record, Timestamp};
 pub use recorder::{BusRecorder, Recorded, Recorder};
+pub use said::{DeviceNetSaid, ProfibusSaid, Said};
 pub use writer::{WriteError, Writer};

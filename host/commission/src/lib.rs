@@ -4,8 +4,11 @@
 //! [profirust](https://docs.rs/profirust), driven as a
 //! [`Station`](codewheel_station::Station) like every other endpoint of the house.
 //!
+//! [`devicenet`] commissions encoders on DeviceNet.
+//!
 //! A [`Session`] is one encoder, asked and told by the same words on both buses; a [`Survey`] is who
 //! is on a bus. Whatever cannot be done is a [`Trouble`]: what was tried, what came back, what to do.
+//! A [`Passport`](passport::Passport) is all that a replacement needs to give the same positions.
 //! A [`Seat`] drives the station behind them, on a real port or on a wire in virtual time.
 //!
 //! # Panics
@@ -15,6 +18,8 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic)
 )]
 
+pub mod devicenet;
+pub mod passport;
 pub mod profibus;
 mod seat;
 mod session;

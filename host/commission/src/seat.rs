@@ -26,6 +26,23 @@ pub trait Seat {
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError>;
 }
 
+/// A seat that is lent.
+impl<S: Seat + ?Sized> Seat for &mut S {
+    type Station = S::Station;
+
+    fn now(&self) -> Instant {
+        S::now(self)
+    }
+
+    fn station(&mut self) -> &mut Self::Station {
+        S::station(self)
+    }
+
+    fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
+        S::turn(self, until)
+    }
+}
+
 /// A seat on a CAN port.
 #[derive(Debug)]
 pub struct CanSeat<S> {

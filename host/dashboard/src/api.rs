@@ -208,7 +208,7 @@ impl From<Refusal> for Problem {
     get,
     path = "/api/v1/openapi.json",
     tag = "plant",
-    responses((status = 200, body = Object, content_type = "application/json"))
+    responses((status = 200, description = "OpenAPI 3.1", body = Object, content_type = "application/json"))
 )]
 async fn openapi(State(shared): State<Arc<Shared>>) -> Response {
     Json(&shared.openapi).into_response()
@@ -219,7 +219,7 @@ async fn openapi(State(shared): State<Arc<Shared>>) -> Response {
     get,
     path = "/api/v1/plant",
     tag = "plant",
-    responses((status = 200, body = PlantDocument))
+    responses((status = 200, description = "The plant", body = PlantDocument))
 )]
 async fn plant(State(shared): State<Arc<Shared>>) -> Json<PlantDocument> {
     let read_only = shared.gate.is_read_only();
@@ -233,8 +233,8 @@ async fn plant(State(shared): State<Arc<Shared>>) -> Json<PlantDocument> {
     tag = "objects",
     params(Device),
     responses(
-        (status = 200, body = [GroupDocument]),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "The objects", body = [GroupDocument]),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn objects(
@@ -254,8 +254,8 @@ async fn objects(
     params(ObjectOfDevice),
     request_body = WriteOrder,
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn write_object(
@@ -276,8 +276,8 @@ async fn write_object(
     params(Device),
     request_body = ShaftOrder,
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn move_shaft(
@@ -307,8 +307,8 @@ async fn move_shaft(
     params(Device),
     request_body = PowerOrder,
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn switch_power(
@@ -328,8 +328,8 @@ async fn switch_power(
     params(Device),
     request_body = SwitchOrder,
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn turn_switches(
@@ -349,8 +349,8 @@ async fn turn_switches(
     params(Device),
     request_body = FaultOrder,
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn begin_fault(
@@ -369,8 +369,8 @@ async fn begin_fault(
     tag = "faults",
     params(FaultOfDevice),
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn end_fault(
@@ -389,8 +389,8 @@ async fn end_fault(
     params(Device),
     request_body = PresetOrder,
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn preset(
@@ -408,8 +408,8 @@ async fn preset(
     tag = "objects",
     params(Device),
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn save(
@@ -426,8 +426,8 @@ async fn save(
     tag = "objects",
     params(Device),
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn restore(
@@ -444,8 +444,8 @@ async fn restore(
     tag = "objects",
     params(Device),
     responses(
-        (status = 200, body = DoneDocument),
-        (status = "default", body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Done", body = DoneDocument),
+        (status = "default", description = "Not done", body = Problem, content_type = "application/problem+json"),
     )
 )]
 async fn reset(

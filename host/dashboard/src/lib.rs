@@ -23,5 +23,5 @@ mod settings;
 mod stream;
 mod view;
 
-pub use server::Dashboard;
+pub use server::{Dashboard, Port};
 pub use settings::{NoToken, Settings, StartError, Token};

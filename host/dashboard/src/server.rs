@@ -61,15 +61,41 @@ impl fmt::Debug for Dashboard {
     }
 }
 
+/// A port for a page, before there is a plant to show. Whoever connects waits.
+#[derive(Debug)]
+pub struct Port {
+    listener: TcpListener,
+    settings: Settings,
+}
+
+impl Port {
+    /// Takes the port that `settings` want, so that nothing is started when there is none.
+    ///
+    /// # Errors
+    /// [`StartError`].
+    pub fn take(settings: Settings) -> Result<Self, StartError> {
+        let listener = listen(&settings)?;
+        listener.set_nonblocking(true)?;
+        Ok(Self { listener, settings })
+    }
+}
+
 impl Dashboard {
-    /// Serves the page of `plant`.
+    /// Serves the page of `plant`: [`Port::take`] and [`Dashboard::serve`].
     ///
     /// # Errors
     /// [`StartError`]; the plant runs on.
     pub fn start(plant: Arc<Running>, settings: Settings) -> Result<Self, StartError> {
-        let listener = listen(&settings)?;
+        Self::serve(plant, Port::take(settings)?)
+    }
+
+    /// Serves the page of `plant` at a port.
+    ///
+    /// # Errors
+    /// [`StartError::System`]; the plant runs on.
+    pub fn serve(plant: Arc<Running>, port: Port) -> Result<Self, StartError> {
+        let Port { listener, settings } = port;
         let address = listener.local_addr()?;
-        listener.set_nonblocking(true)?;
         let router = router(plant, settings, address)?;
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_io()

@@ -71,10 +71,10 @@ pub(crate) enum EventDocument {
     tag = "plant",
     params(Wanted),
     responses(
-        (status = 200, body = EventDocument, content_type = "text/event-stream"),
-        (status = 404, body = Problem, content_type = "application/problem+json"),
-        (status = 422, body = Problem, content_type = "application/problem+json"),
-        (status = 503, body = Problem, content_type = "application/problem+json"),
+        (status = 200, description = "Events without end", body = EventDocument, content_type = "text/event-stream"),
+        (status = 404, description = "No such bus or device", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "No such rate", body = Problem, content_type = "application/problem+json"),
+        (status = 503, description = "Too many streams", body = Problem, content_type = "application/problem+json"),
     )
 )]
 pub(crate) async fn events(

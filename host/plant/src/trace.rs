@@ -167,13 +167,13 @@ impl Heard {
         // Times of a bus count from its start, and so do those of a line.
         let at = Timestamp::from_nanos(self.at.as_nanos());
         let record = Record { at, bus: 0, direction: self.direction, content };
-        let said = decoder.say(bus, &record);
+        let caption = decoder.caption(bus, &record);
         TraceLine {
             at: self.at,
-            from: said.from,
-            to: said.to,
-            name: said.message,
-            text: said.text,
+            from: caption.from,
+            to: caption.to,
+            name: caption.message,
+            text: caption.text,
             identifier,
             octets: hex(octets),
         }

@@ -118,11 +118,15 @@ impl DataType {
         })
     }
 
-    const fn is_signed(self) -> bool {
+    /// Whether its numbers have a sign.
+    #[must_use]
+    pub const fn is_signed(self) -> bool {
         matches!(self.0, 0x03 | 0x05..=0x07 | 0xC2..=0xC5)
     }
 
-    const fn is_integer(self) -> bool {
+    /// Whether it is an integer, or a string of bits that is written as one.
+    #[must_use]
+    pub const fn is_integer(self) -> bool {
         matches!(self.0, 0x01..=0x0A | 0xC1..=0xC9 | 0xD1..=0xD4)
     }
 
@@ -290,6 +294,7 @@ enum Place {
 #[derive(Clone, Debug)]
 pub struct ParameterWalk {
     place: Place,
+    first_instance: u8,
     last_instance: u8,
     last_attribute: u8,
     repeats: u8,
@@ -308,10 +313,23 @@ impl ParameterWalk {
     pub const fn new() -> Self {
         Self {
             place: Place::MaxInstance,
+            first_instance: 1,
             last_instance: 0,
             last_attribute: LAST_OF_FULL,
             repeats: 0,
             parameter: Parameter::NONE,
+        }
+    }
+
+    /// A walk over instance `number` alone, 1 … 255. Where the device has no such instance it brings
+    /// no parameter.
+    #[must_use]
+    pub const fn of_one(number: u8) -> Self {
+        Self {
+            place: Place::ClassDescriptor,
+            first_instance: number,
+            last_instance: number,
+            ..Self::new()
         }
     }
 
@@ -373,7 +391,7 @@ impl ParameterWalk {
                 {
                     self.last_attribute = LAST_OF_STUB;
                 }
-                self.place = Place::Instance { number: 1, attribute: 1 };
+                self.place = Place::Instance { number: self.first_instance, attribute: 1 };
                 Walked::On
             }
             Place::Instance { number, attribute } => {

@@ -12,8 +12,14 @@ const MISSING: Response<'static> =
     Response::Refused(Error { general: GeneralStatus::OBJECT_DOES_NOT_EXIST, additional: 0xFF });
 
 /// Walks a device that answers as `answer` says.
-fn walk(mut answer: impl FnMut(u8, u8) -> Response<'static>) -> (Vec<Parameter>, Vec<[u8; 4]>) {
-    let mut walk = ParameterWalk::new();
+fn walk(answer: impl FnMut(u8, u8) -> Response<'static>) -> (Vec<Parameter>, Vec<[u8; 4]>) {
+    take(ParameterWalk::new(), answer)
+}
+
+fn take(
+    mut walk: ParameterWalk,
+    mut answer: impl FnMut(u8, u8) -> Response<'static>,
+) -> (Vec<Parameter>, Vec<[u8; 4]>) {
     let (mut found, mut asked) = (Vec::new(), Vec::new());
     while let Some(request) = walk.request() {
         asked.push(request);
@@ -65,6 +71,17 @@ fn each_full_instance_is_asked_for_all_its_attributes() {
     assert_eq!((second.scaling, second.scaling_links), ([2, 1, 1, 1], [3, 1, 1, 1]));
     assert!(second.is_read_only() && !second.is_enumerated());
     assert_eq!((second.size, second.decimals), (2, 1));
+}
+
+#[test]
+fn one_instance_is_walked_alone() {
+    let (found, asked) = take(ParameterWalk::of_one(2), full);
+    assert_eq!(found.iter().map(|parameter| parameter.number).collect::<Vec<_>>(), [2]);
+    assert_eq!(asked.len(), 1 + 20);
+    assert_eq!(asked[..2], [[14, 15, 0, 8], [14, 15, 2, 1]]);
+    let (found, asked) = take(ParameterWalk::of_one(255), |_, _| MISSING);
+    assert!(found.is_empty());
+    assert_eq!(asked.len(), 2);
 }
 
 #[test]

@@ -11,6 +11,7 @@ use codewheel_station::can::{Frame, Identifier as CanIdentifier};
 use self::explicit::Explicit;
 use super::Assume;
 use super::line::Line;
+use crate::{DeviceNetSaid, Said};
 
 /// Everything remembered of a segment.
 #[derive(Debug)]
@@ -100,6 +101,9 @@ impl DeviceNet {
                 return line.octets("data", "data", data);
             }
         }
+        if !data.is_empty() {
+            line.said(Said::DeviceNet(DeviceNetSaid::Produced { slave: source.value(), data }));
+        }
         values::produced(data, self.nodes.is_encoder(source), line);
     }
 
@@ -153,6 +157,8 @@ impl DeviceNet {
                 }
                 line.number("vendor", "vendor", vendor.into(), "");
                 line.number("serial-number", "serial number", serial.into(), "");
+                let said = DeviceNetSaid::DuplicateCheck { mac: mac.value(), vendor, serial };
+                line.said(Said::DeviceNet(said));
                 self.nodes.learn(mac, vendor);
             }
             Err(_) => {

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use super::{Output, Said};
+use super::{Caption, Output};
 use crate::format::log::push_frame;
 use crate::hex::{push_decimal, push_octets};
-use crate::{Bus, Content, Direction, Record};
+use crate::said::Listener;
+use crate::{Bus, Content, Direction, Record, Said};
 
 /// The line that is being written.
 ///
@@ -26,6 +27,7 @@ pub(super) struct Line<'o> {
     notes: bool,
     /// The name of the next value has been said already.
     told: bool,
+    listener: Listener<'o>,
     /// Who speaks to whom.
     ends: (Option<u8>, Option<u8>),
     /// Where the kind of message stands.
@@ -41,6 +43,7 @@ impl<'o> Line<'o> {
         output: Output,
         bus: &Bus,
         record: &Record<'_>,
+        listener: Listener<'o>,
     ) -> Self {
         let nanos = record.at.as_nanos();
         match output {
@@ -86,7 +89,21 @@ impl<'o> Line<'o> {
             }
         }
         let message = out.len()..out.len();
-        Self { out, output, values: false, notes: false, told: false, ends: (None, None), message }
+        Self {
+            out,
+            output,
+            values: false,
+            notes: false,
+            told: false,
+            listener,
+            ends: (None, None),
+            message,
+        }
+    }
+
+    /// What the record says, for whoever hears it.
+    pub(super) fn said(&mut self, said: Said<'_>) {
+        self.listener.tell(said);
     }
 
     /// Who speaks to whom, where that is known.
@@ -284,12 +301,12 @@ impl<'o> Line<'o> {
     }
 
     /// Ends a line of text that is wanted in its parts.
-    pub(super) fn into_said(self) -> Said {
+    pub(super) fn into_caption(self) -> Caption {
         let part = |range| String::from_utf8_lossy(self.out.get(range).unwrap_or_default());
         let (from, to) = self.ends;
         let behind = part(self.message.end..self.out.len());
         let text = behind.trim_start_matches(':').trim();
-        Said { from, to, message: part(self.message).into_owned(), text: text.to_owned() }
+        Caption { from, to, message: part(self.message).into_owned(), text: text.to_owned() }
     }
 
     pub(super) fn end(mut self, content: &Content<'_>) {

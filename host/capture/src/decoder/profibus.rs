@@ -11,6 +11,7 @@ use codewheel_profibus::telegram::{Damage, Data, Telegram};
 use self::service::Service;
 use super::Assume;
 use super::line::Line;
+use crate::{ProfibusSaid, Said};
 
 /// Everything remembered of a line.
 #[derive(Debug)]
@@ -18,6 +19,8 @@ pub(super) struct Profibus {
     slaves: Slaves,
     /// The request that waits for its answer: nobody else speaks before.
     asked: Option<Asked>,
+    /// Its data.
+    request: Vec<u8>,
 }
 
 /// A request that wants an answer.
@@ -64,7 +67,7 @@ const EVERYBODY: u8 = 127;
 
 impl Profibus {
     pub(super) fn new(assume: Assume) -> Self {
-        Self { slaves: Slaves { assume, idents: [None; 128] }, asked: None }
+        Self { slaves: Slaves { assume, idents: [None; 128] }, asked: None, request: Vec::new() }
     }
 
     pub(super) fn decode(&mut self, octets: &[u8], broken: bool, line: &mut Line<'_>) {
@@ -96,6 +99,13 @@ impl Profibus {
         match self.asked.take() {
             Some(Asked { from, to, what: What::Service(service), identifier }) => {
                 line.ends(Some(to), Some(from));
+                line.said(Said::Profibus(ProfibusSaid {
+                    slave: to,
+                    master: from,
+                    sap: service.sap(),
+                    request: &self.request,
+                    response: &[],
+                }));
                 line.message("acknowledge");
                 service.tell(line);
                 if let (Service::CheckConfiguration, Some(identifier)) = (service, identifier) {
@@ -140,6 +150,8 @@ impl Profibus {
                 };
                 service.tell(line);
                 asked.what = What::Service(service);
+                self.request.clear();
+                self.request.extend_from_slice(data.data());
                 if let (Service::CheckConfiguration, [identifier]) = (service, data.data()) {
                     asked.identifier = Some(*identifier);
                 }
@@ -209,6 +221,17 @@ impl Profibus {
             Some(What::Service(service)) => Some(service),
             _ => None,
         });
+        if let (Some(service), true) = (service, matches!(what, Some(What::Service(_))))
+            && matches!(reply, Reply::DataLow | Reply::DataHigh)
+        {
+            line.said(Said::Profibus(ProfibusSaid {
+                slave: from,
+                master: to,
+                sap: service.sap(),
+                request: &self.request,
+                response: data.data(),
+            }));
+        }
         match service {
             Some(service) => {
                 service.tell(line);

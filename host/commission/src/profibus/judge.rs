@@ -19,6 +19,11 @@ pub(super) enum Awaited {
         /// Its address.
         address: u8,
     },
+    /// A station was asked outside of the cycle.
+    Acyclic {
+        /// Its address.
+        address: u8,
+    },
     /// A slave was asked.
     Answer {
         /// Its place.
@@ -32,6 +37,15 @@ pub(super) enum Awaited {
 const MASTER_SAP: u8 = 62;
 const DIAGNOSIS_SAP: u8 = 60;
 
+/// Whether somebody asks, or hands the token on.
+const fn is_request(telegram: &Telegram<'_>) -> bool {
+    match telegram {
+        Telegram::Data(data) => matches!(data.h.fc, FunctionCode::Request { .. }),
+        Telegram::Token(_) => true,
+        Telegram::ShortConfirmation(_) => false,
+    }
+}
+
 impl Master {
     /// Notes what is asked by a telegram on its way out, and gives its address and service where it
     /// is a slave that is asked.
@@ -41,6 +55,10 @@ impl Master {
             return None;
         };
         let FunctionCode::Request { req, .. } = asked.h.fc else { return None };
+        if let Some(address) = self.requests.asks().filter(|address| *address == asked.h.da) {
+            self.awaited = Awaited::Acyclic { address };
+            return None;
+        }
         if req == RequestType::FdlStatus {
             self.awaited = Awaited::Status { address: asked.h.da };
         }
@@ -55,7 +73,19 @@ impl Master {
 
     /// Whether profirust may see this telegram; notes what it tells about slaves.
     pub(super) fn judge(&mut self, now: Instant, octets: &[u8]) -> bool {
-        let fits = match Telegram::deserialize(octets) {
+        let telegram = Telegram::deserialize(octets);
+        if let (Awaited::Acyclic { address }, Some(Ok((telegram, _)))) = (self.awaited, &telegram)
+            && !is_request(telegram)
+        {
+            let fits = self.is_from(address, telegram) && self.requests.fits(telegram);
+            if fits {
+                self.awaited = Awaited::Nothing;
+            } else {
+                self.counters.unexpected += 1;
+            }
+            return fits;
+        }
+        let fits = match telegram {
             Some(Ok((Telegram::Token(TokenTelegram { da, sa }), _))) => {
                 let fits = da <= HIGHEST_ADDRESS && sa <= HIGHEST_ADDRESS;
                 if fits {
@@ -78,6 +108,16 @@ impl Master {
             self.counters.unexpected += 1;
         }
         fits
+    }
+
+    /// Whether `telegram` is an answer from `address` to this master, or may be one: a short
+    /// confirmation does not say from whom it is.
+    fn is_from(&self, address: u8, telegram: &Telegram<'_>) -> bool {
+        match telegram {
+            Telegram::Data(data) => data.h.sa == address && data.h.da == self.settings.address,
+            Telegram::ShortConfirmation(_) => true,
+            Telegram::Token(_) => false,
+        }
     }
 
     fn short_confirmation(&mut self, now: Instant) -> bool {
@@ -105,7 +145,7 @@ impl Master {
             return false;
         }
         let (place, service) = match self.awaited {
-            Awaited::Nothing => return false,
+            Awaited::Nothing | Awaited::Acyclic { .. } => return false,
             Awaited::Status { address } => {
                 let fits = data.h.sa == address;
                 if fits {

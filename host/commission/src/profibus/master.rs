@@ -7,11 +7,12 @@ use profirust::dp::{DpMaster, PeripheralEvent, PeripheralHandle};
 use profirust::fdl::FdlActiveStation;
 use thiserror::Error;
 
+use super::acyclic::{Acyclic, Answered, Requests};
 use super::clock::Clock;
 use super::event::{Event, Events};
 use super::judge::Awaited;
 use super::line::Line;
-use super::settings::{MasterSettings, SettingsError, SlaveSettings, USER_PARAMETER_OCTETS};
+use super::settings::{HIGHEST_ADDRESS, MasterSettings, SettingsError, SlaveSettings};
 use super::slave::{CycleTimes, Service, Slave, SlaveState, SlaveView, Validating};
 use super::telegram::Receiver;
 
@@ -85,6 +86,9 @@ pub struct Master {
     pub(super) free_at: Instant,
     /// When to join the bus anew after a collision of addresses.
     pub(super) rejoins: Option<Instant>,
+    pub(super) requests: Requests,
+    /// Its slaves are served no more.
+    pub(super) is_stopped: bool,
     pub(super) events: Events,
     pub(super) counters: Counters,
     cycle_ended: Option<Instant>,
@@ -132,6 +136,8 @@ impl Master {
             speaks_until: Instant::ZERO,
             free_at: Instant::ZERO,
             rejoins: None,
+            requests: Requests::default(),
+            is_stopped: false,
             events: Events::default(),
             counters: Counters::default(),
             cycle_ended: None,
@@ -198,11 +204,10 @@ impl Master {
             .iter_mut()
             .find(|slave| slave.settings.address == address)
             .ok_or(NotParameterized::UnknownSlave(address))?;
-        let given = user_parameters.len();
-        if given > USER_PARAMETER_OCTETS {
-            return Err(SettingsError::UserParameters { address, given }.into());
-        }
-        slave.parameters_waiting = Some(user_parameters);
+        let wanted = slave.renewal.as_ref().unwrap_or(&slave.settings);
+        let wanted = SlaveSettings { user_parameters, ..wanted.clone() };
+        wanted.check(self.settings.address)?;
+        slave.renewal = Some(wanted);
         Ok(())
     }
 
@@ -219,6 +224,70 @@ impl Master {
             .ok_or(UnknownSlave(address))?;
         slave.diagnosis_waiting = true;
         Ok(())
+    }
+
+    /// Serves a slave besides the others; the one that is served already at this address is begun
+    /// anew with these settings, once it owes no answer. [`Event::Configured`] tells that it took
+    /// them, [`Event::ParameterError`] and [`Event::ConfigurationError`] that it did not.
+    ///
+    /// # Errors
+    /// What is wrong with the settings; nothing is changed.
+    pub fn serve(&mut self, slave: SlaveSettings) -> Result<(), SettingsError> {
+        slave.check(self.settings.address)?;
+        let known = self.slaves.iter_mut().find(|known| known.settings.address == slave.address);
+        match known {
+            Some(known) => known.renewal = Some(slave),
+            None => {
+                let handle = self.dp.add(Slave::peripheral(&slave));
+                self.slaves.push(Slave::new(slave, handle));
+            }
+        }
+        Ok(())
+    }
+
+    /// Serves its slaves no more, whose watchdogs let go. It keeps its place in the token ring and asks
+    /// what it is told to [`ask`](Self::ask).
+    pub const fn stop(&mut self) {
+        self.is_stopped = true;
+    }
+
+    /// Asks a station once, between two cycles; [`take_answer`](Self::take_answer) tells what came of
+    /// it. A request without an answer is repeated as often as the settings say.
+    ///
+    /// # Errors
+    /// An address that no station has, or that of this master.
+    pub fn ask(&mut self, address: u8, request: Acyclic) -> Result<(), SettingsError> {
+        if address > HIGHEST_ADDRESS {
+            return Err(SettingsError::SlaveAddress(address));
+        }
+        if address == self.settings.address {
+            return Err(SettingsError::AddressInUse(address));
+        }
+        self.requests.push(address, request);
+        Ok(())
+    }
+
+    /// How many requests that it was told to [`ask`](Self::ask) it sends before the next cycle through
+    /// its slaves, or before it hands the token on; 1 unless it is told otherwise. Those to which nobody
+    /// answers last a slot time each, and other masters wait so long.
+    pub const fn ask_in_a_row(&mut self, most: u8) {
+        self.requests.set_most_in_a_row(most);
+    }
+
+    /// What came of the oldest request that was [asked](Self::ask) and has not been fetched.
+    pub fn take_answer(&mut self) -> Option<Answered> {
+        self.requests.take()
+    }
+
+    /// Whether all is asked that it was told to ask.
+    #[must_use]
+    pub fn has_asked_all(&self) -> bool {
+        self.requests.is_done()
+    }
+
+    /// Asks no more of what it was told to ask and has not asked yet.
+    pub fn ask_no_more(&mut self) {
+        self.requests.clear();
     }
 
     /// The oldest event that has not been fetched.
@@ -248,20 +317,12 @@ impl Master {
             if slave.unanswered > 0 {
                 continue;
             }
+            if let Some(settings) = slave.renewal.take() {
+                *self.dp.get_mut(slave.handle) = Slave::peripheral(&settings);
+                slave.renew(settings);
+            }
             if slave.validating.take_if(|validating| validating.is_hopeless(now)).is_some() {
                 self.dp.get_mut(slave.handle).reset_address(slave.settings.address);
-            }
-            if let Some(parameters) = slave.parameters_waiting.take() {
-                slave.settings.user_parameters = parameters;
-                // Another length needs another peripheral; a new one begins with the diagnosis.
-                *self.dp.get_mut(slave.handle) = Slave::peripheral(&slave.settings);
-                slave.outputs_waiting = true;
-                slave.refused = false;
-                slave.told = false;
-                slave.validating = None;
-                if slave.state != SlaveState::Absent {
-                    slave.state = SlaveState::Configuring;
-                }
             }
             if slave.outputs_waiting {
                 slave.outputs_waiting = false;

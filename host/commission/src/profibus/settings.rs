@@ -157,6 +157,18 @@ pub const fn shortest_slot(baud_rate: BaudRate) -> u16 {
     }
 }
 
+/// How long an answer may take to begin on the port of a PC, which takes its time.
+const PATIENCE: Duration = Duration::from_millis(20);
+
+/// A slot time at a rate for the ports of a PC, in bits: 20 ms, as far as a slot time can be as long,
+/// and never less than [`shortest_slot`].
+#[must_use]
+pub fn patient_slot(baud_rate: BaudRate) -> u16 {
+    let bits = PATIENCE.as_nanos() * u64::from(baud_rate.bits_per_second()) / 1_000_000_000;
+    let patient = u16::try_from(bits).unwrap_or(LONGEST_SLOT).min(LONGEST_SLOT);
+    patient.max(shortest_slot(baud_rate))
+}
+
 impl MasterSettings {
     /// A master at `address` with the shortest slot time, min T_SDR 11, HSA 126, GAP factor 10, one
     /// retry, and a watchdog of 200 ms.

@@ -209,8 +209,8 @@ pub(super) struct Slave {
     /// Outputs or a wish for the diagnosis wait for the next request.
     pub(super) outputs_waiting: bool,
     pub(super) diagnosis_waiting: bool,
-    /// Other user parameters wait until it owes no answer.
-    pub(super) parameters_waiting: Option<Vec<u8>>,
+    /// Other settings wait for the next request.
+    pub(super) renewal: Option<SlaveSettings>,
 }
 
 impl Slave {
@@ -231,8 +231,28 @@ impl Slave {
             validating: None,
             outputs_waiting: false,
             diagnosis_waiting: false,
-            parameters_waiting: None,
+            renewal: None,
             settings,
+        }
+    }
+
+    /// Is begun anew with other settings; what was counted stays, and so do outputs that still fit.
+    pub(super) fn renew(&mut self, settings: SlaveSettings) {
+        if self.state != SlaveState::Absent {
+            self.state = SlaveState::Configuring;
+        }
+        let outputs = std::mem::take(&mut self.outputs);
+        *self = Self {
+            state: self.state,
+            answers: self.answers,
+            repetitions: self.repetitions,
+            losses: self.losses,
+            diagnosis: self.diagnosis.take(),
+            ..Self::new(settings, self.handle)
+        };
+        if outputs.len() == self.outputs.len() {
+            self.outputs = outputs;
+            self.outputs_waiting = true;
         }
     }
 
@@ -271,11 +291,8 @@ impl Slave {
             inputs: &self.inputs,
             input_at: self.input_at,
             outputs: &self.outputs,
-            user_parameters: self
-                .parameters_waiting
-                .as_ref()
-                .unwrap_or(&self.settings.user_parameters),
-            parameters_waiting: self.parameters_waiting.is_some(),
+            user_parameters: &self.renewal.as_ref().unwrap_or(&self.settings).user_parameters,
+            parameters_waiting: self.renewal.is_some(),
             diagnosis: self.diagnosis.as_ref(),
             answers: self.answers,
             repetitions: self.repetitions,

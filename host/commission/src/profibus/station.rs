@@ -4,6 +4,7 @@ use codewheel_station::rs485::{BaudRate, Input, Node, Transmission};
 use codewheel_station::{Duration, Instant, Station};
 
 use super::Event;
+use super::acyclic::Applications;
 use super::judge::Awaited;
 use super::master::Master;
 use super::telegram::{SYNCHRONIZATION_BITS, fill};
@@ -120,11 +121,10 @@ impl Master {
     fn poll_at(&mut self, now: Instant) {
         let tick = self.clock.tick(now);
         // Its DP master never ends a cycle without slaves.
-        if self.slaves.is_empty() {
-            self.fdl.poll(tick.time(), &mut self.line, &mut ());
-        } else {
-            self.fdl.poll(tick.time(), &mut self.line, &mut self.dp);
-        }
+        let is_serving = !self.slaves.is_empty() && !self.is_stopped;
+        let dp = is_serving.then_some(&mut self.dp);
+        let mut applications = Applications { dp, requests: &mut self.requests };
+        self.fdl.poll(tick.time(), &mut self.line, &mut applications);
         self.line.polled(tick);
         self.polled = Some(now);
         self.take_reports(now);

@@ -24,10 +24,12 @@
 //! | 87 | slave u8 | a diagnosis is asked for |
 //! | 88 | DA, SA | a token comes by |
 //! | 89 | DA, SA, FC | a telegram without data comes by |
+//! | 8A | address u8, what u8 | a station is asked outside of the cycle, for one of four (modulo) |
+//! | 8B | slave u8 | one of them (modulo three) is begun anew |
 //!
 //! Every other octet does nothing. An operation that the input ends in takes zeros.
 
-use codewheel_commission::profibus::{Master, MasterSettings, SlaveSettings, SlaveState};
+use codewheel_commission::profibus::{Acyclic, Master, MasterSettings, SlaveSettings, SlaveState};
 use codewheel_profibus::function_code::FunctionCode;
 use codewheel_profibus::telegram::{Data, Head, SC, Saps, Telegram};
 use codewheel_station::rs485::{BaudRate, Input, Transmission};
@@ -156,6 +158,21 @@ impl Bench {
                 let [to, from, code] = reader.array().unwrap_or_default();
                 self.hear(SYNCHRONIZATION_BITS, &telegram(to, from, code, None, &[]));
             }
+            0x8A => {
+                let [address, what] = reader.array().unwrap_or_default();
+                let all = [
+                    Acyclic::FdlStatus,
+                    Acyclic::Diagnosis,
+                    Acyclic::Configuration,
+                    Acyclic::Unlock,
+                ];
+                let asked = self.master.ask(address, all[usize::from(what % 4)]);
+                assert_eq!(asked.is_ok(), address <= 125 && address != MASTER);
+            }
+            0x8B => {
+                let slave = SLAVES[usize::from(reader.u8().unwrap_or_default() % 3)];
+                self.master.serve(slave_settings(slave)).expect("settings that are possible");
+            }
             _ => {}
         }
     }
@@ -247,7 +264,8 @@ impl Bench {
                 }
             }
             (Some(61), _) => {
-                self.stands[place] = Stands::Parameterized;
+                let unlocks = data.data().first().is_some_and(|first| first & 0x40 != 0);
+                self.stands[place] = if unlocks { Stands::Free } else { Stands::Parameterized };
                 vec![SC]
             }
             (Some(62), _) if stands == Stands::Parameterized => {
@@ -264,6 +282,9 @@ impl Bench {
         assert!(self.master.deadline().is_some(), "a master is never done");
         while let Some(event) = self.master.take_event() {
             assert!(!event.to_string().is_empty());
+        }
+        while let Some(answered) = self.master.take_answer() {
+            assert!(answered.address <= 125 && answered.address != MASTER, "{answered:?}");
         }
         for slave in self.master.slaves() {
             assert!(SLAVES.contains(&slave.address), "{slave:?}");

@@ -128,7 +128,7 @@ fn a_trace_shows_what_the_bus_carries() {
 }
 
 #[test]
-fn a_slower_rate_brings_fewer_and_larger_patches() {
+fn a_slower_rate_brings_fewer_patches_and_leaves_nothing_out() {
     let page = Page::start();
     page.done("POST", "line/devices/drive/shaft", r#"{"motion":"turn rpm=60"}"#);
     let mut slow = page.events("?rate=2");
@@ -136,6 +136,27 @@ fn a_slower_rate_brings_fewer_and_larger_patches() {
     let first = slow.next_of("state")["at"].as_f64().expect("a moment");
     let then = slow.next_of("state")["at"].as_f64().expect("a moment");
     assert!((0.4..3.0).contains(&(then - first)), "{first} … {then}");
+    let steps = "line/devices/drive/objects/steps-per-turn";
+    for value in [1_000, 2_000, 3_000] {
+        page.done("PUT", steps, &format!(r#"{{"value":{value}}}"#));
+        slow.until("the new steps", |state| {
+            state["buses"]["line"]["devices"]["drive"]["steps_per_turn"] == value
+        });
+    }
+}
+
+#[test]
+fn no_stream_gets_more_than_20_states_a_second() {
+    let page = Page::start();
+    page.done("POST", "line/devices/drive/shaft", r#"{"motion":"turn rpm=60"}"#);
+    let mut events = page.events("");
+    events.next_of("state");
+    let first = events.next_of("state")["at"].as_f64().expect("a moment");
+    for _ in 0..39 {
+        events.next_of("state");
+    }
+    let last = events.next_of("state")["at"].as_f64().expect("a moment");
+    assert!(last - first >= 1.95, "40 states in {} s", last - first);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use codewheel_commission::profibus::{MasterSettings, SettingsError};
+use codewheel_commission::profibus::{MasterSettings, SettingsError, patient_slot};
 use codewheel_device::profibus::{Switches, configuration};
 use codewheel_encoder::{Direction, Geometry};
 use codewheel_link::{BusUri, Medium};
@@ -20,12 +20,6 @@ use crate::plant::default_name;
 use crate::{
     BusPlan, Cable, Complaint, DeviceOptions, DpMasterPlan, DpSlavePlan, PresetPlan, Profibus,
 };
-
-/// How long a master on a real port waits for an answer to begin: ports of a PC take their time.
-const SLOT: Duration = Duration::from_millis(20);
-
-/// The longest slot time that the standard can write, in bits.
-const LONGEST_SLOT: u16 = 16_383;
 
 /// A rate as people write it: `19.2k`, `1.5M`, or in bits per second, `19200`.
 #[must_use]
@@ -224,9 +218,7 @@ impl Source<'_> {
     ) -> Result<MasterSettings, Complaint> {
         let address = self.station_address(&table.address)?;
         let default = MasterSettings::new(address, bus.bit_rate);
-        let bits = SLOT.as_nanos() * u64::from(bus.bit_rate.bits_per_second()) / 1_000_000_000;
-        let patient = u16::try_from(bits).unwrap_or(LONGEST_SLOT).min(LONGEST_SLOT);
-        let slot = if bus.is_virtual() { default.slot() } else { patient.max(default.slot()) };
+        let slot = if bus.is_virtual() { default.slot() } else { patient_slot(bus.bit_rate) };
         // A cycle through all slaves must fit into it.
         let slow = bus.bit_rate < BaudRate::Kbit187_5;
         let watchdog = Duration::from_millis(if slow { 5_000 } else { 200 });

@@ -110,9 +110,13 @@ impl DpMaster {
             let text = format!("the device would refuse this: {refusal}; nothing was changed");
             return Err(Refusal::new(Cause::Value, text));
         }
-        let answers =
-            self.master.slave(address).is_some_and(|slave| slave.state != SlaveState::Absent);
+        let answers = self
+            .master
+            .station()
+            .slave(address)
+            .is_some_and(|slave| slave.state != SlaveState::Absent);
         self.master
+            .station_mut()
             .set_user_parameters(address, user)
             .map_err(|error| Refusal::new(Cause::Failed, error.to_string()))?;
         Ok(if answers {
@@ -155,7 +159,12 @@ impl DpMaster {
         if value > max {
             return refused(Cause::Value, &format!("it is 0 to {max}"));
         }
-        if self.master.slave(address).is_none_or(|slave| slave.state != SlaveState::DataExchange) {
+        if self
+            .master
+            .station()
+            .slave(address)
+            .is_none_or(|slave| slave.state != SlaveState::DataExchange)
+        {
             return refused(Cause::State, "the master exchanges no data with the device now");
         }
         let id = self.next_preset;

@@ -2,10 +2,12 @@
 
 use std::collections::VecDeque;
 
-use codewheel_commission::profibus::{self, Diagnosis, Event, Master, SettingsError, SlaveView};
+use codewheel_commission::profibus::{
+    self, Diagnosis, Event, Master, SettingsError, SlaveView, Timeless,
+};
 use codewheel_encoder::Model;
-use codewheel_station::rs485::{BaudRate, Input, Node, TRANSMISSION_OCTETS, Transmission};
-use codewheel_station::{Instant, Station, earlier};
+use codewheel_station::rs485::{BaudRate, Input, Node, Transmission};
+use codewheel_station::{Instant, Station};
 
 use super::presets::Presetting;
 use super::{DpMasterPlan, Profibus};
@@ -17,25 +19,16 @@ use crate::{Cause, Refusal};
 /// What waits to be fetched of what the master tells; beyond it the oldest gives way.
 const TOLD: usize = 256;
 
-/// Octets that wait for the end of the own telegram; a peer that sends more than a few telegrams in
-/// that time does not follow the bus.
-const EARLY: usize = 4 * TRANSMISSION_OCTETS;
-
 /// A DP master with its agenda of presets.
 #[derive(Debug)]
 pub struct DpMaster {
-    pub(super) master: Master,
+    pub(super) master: Timeless<Master>,
     pub(super) planned: Vec<Planned>,
     pub(super) agenda: Vec<Presetting>,
     /// The number of the next preset that somebody asks for.
     pub(super) next_preset: u64,
     repeats: Repeats<Event>,
     told: VecDeque<Told>,
-    /// When its own telegram ends.
-    speaks_until: Instant,
-    /// What came before that: over TCP and on a pty octets take no time, so a slave may have
-    /// answered a request that by the rate of the line is still being sent.
-    early: Vec<u8>,
 }
 
 /// What the plan says of a slave.
@@ -69,30 +62,21 @@ impl DpMaster {
             planned,
             agenda: agenda.collect(),
             next_preset: 0,
-            master: Master::new(plan.settings.clone(), slaves)?,
+            master: Timeless::new(Master::new(plan.settings.clone(), slaves)?),
             repeats: Repeats::new(),
             told: VecDeque::new(),
-            speaks_until: Instant::ZERO,
-            early: Vec::new(),
         })
     }
 
     /// The user octets of Set_Prm that the slave at `address` gets.
     pub(super) fn user_parameters(&self, address: u8) -> Option<&[u8]> {
-        Some(self.master.slave(address)?.user_parameters)
-    }
-
-    /// Hears what came while it spoke.
-    fn catch_up(&mut self, now: Instant) {
-        if !self.early.is_empty() && self.speaks_until <= now {
-            let early = std::mem::take(&mut self.early);
-            self.master.handle(now, Input::Octets(&early));
-        }
+        Some(self.master.station().slave(address)?.user_parameters)
     }
 
     /// Hears what the master has to tell, and moves the presets on.
     fn tend(&mut self, now: Instant) {
-        while let Some(event) = self.master.take_event() {
+        let master = self.master.station_mut();
+        while let Some(event) = master.take_event() {
             let text = match self.repeats.tell(now, event) {
                 None => continue,
                 Some(1) => event.to_string(),
@@ -104,7 +88,7 @@ impl DpMaster {
             self.told.push_back(Told { at: now, text, trouble: event.is_trouble() });
         }
         for presetting in &mut self.agenda {
-            presetting.tend(now, &mut self.master);
+            presetting.tend(now, master);
         }
         self.agenda.retain(|presetting| !presetting.is_done());
     }
@@ -115,35 +99,21 @@ impl Station for DpMaster {
     type Output = Transmission;
 
     fn handle(&mut self, now: Instant, input: Input<'_>) {
-        match input {
-            Input::Octets(octets) if now < self.speaks_until => {
-                let room = EARLY.saturating_sub(self.early.len()).min(octets.len());
-                self.early.extend_from_slice(&octets[..room]);
-            }
-            input => {
-                self.catch_up(now);
-                self.master.handle(now, input);
-            }
-        }
+        self.master.handle(now, input);
     }
 
     fn advance(&mut self, now: Instant) {
-        self.catch_up(now);
         self.master.advance(now);
     }
 
     fn transmit(&mut self, now: Instant) -> Option<Transmission> {
         self.tend(now);
-        let telegram = self.master.transmit(now)?;
-        let length = telegram.octets().len() as u32;
-        self.speaks_until = now + self.master.baud_rate().characters(length);
-        Some(telegram)
+        self.master.transmit(now)
     }
 
     fn deadline(&self) -> Option<Instant> {
         // A master that serves slaves is never silent for long, so presets are given in passing.
-        let early = (!self.early.is_empty()).then_some(self.speaks_until);
-        earlier(early, self.master.deadline())
+        self.master.deadline()
     }
 }
 
@@ -155,7 +125,7 @@ impl Node for DpMaster {
 
 impl Talker<Profibus> for DpMaster {
     fn slave(&self, address: u8) -> Option<Seen> {
-        let slave = self.master.slave(address)?;
+        let slave = self.master.station().slave(address)?;
         Some(Seen {
             state: match slave.state {
                 profibus::SlaveState::Absent => SlaveState::Absent,
@@ -172,11 +142,11 @@ impl Talker<Profibus> for DpMaster {
     }
 
     fn is_on_line(&self) -> bool {
-        self.master.is_in_ring()
+        self.master.station().is_in_ring()
     }
 
     fn cycle_times(&self) -> CycleTimes {
-        let profibus::CycleTimes { count, last, longest, .. } = self.master.cycle_times();
+        let profibus::CycleTimes { count, last, longest, .. } = self.master.station().cycle_times();
         CycleTimes { count, last, longest }
     }
 
@@ -196,7 +166,7 @@ impl Talker<Profibus> for DpMaster {
     }
 
     fn ended(&self, address: u8, begun: &Begun) -> Option<Result<(), Refusal>> {
-        let slave = self.master.slave(address)?;
+        let slave = self.master.station().slave(address)?;
         match begun {
             Begun::Presetting(id, _) => {
                 let waits = self.agenda.iter().any(|presetting| presetting.waits(*id));

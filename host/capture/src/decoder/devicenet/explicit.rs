@@ -8,6 +8,7 @@ use codewheel_devicenet::{MacId, choice};
 
 use super::super::line::Line;
 use super::{Nodes, objects, values};
+use crate::{DeviceNetSaid, Said};
 
 /// The longest message that is put together; the longest of ours has 192 octets.
 const LONGEST: usize = 512;
@@ -35,7 +36,8 @@ struct Conversation {
 /// Everything remembered of explicit messages.
 #[derive(Debug, Default)]
 pub(super) struct Explicit {
-    asked: HashMap<Conversation, Asked>,
+    /// With the data of the request.
+    asked: HashMap<Conversation, (Asked, Vec<u8>)>,
     requests: HashMap<Conversation, Box<Reassembly<LONGEST>>>,
     responses: HashMap<Conversation, Box<Reassembly<LONGEST>>>,
 }
@@ -84,7 +86,7 @@ impl Explicit {
                 let is_encoder = nodes.is_encoder(slave);
                 tell(&asked, is_encoder, line);
                 request_data(&asked, rest, is_encoder, line);
-                self.asked.insert(with, asked);
+                self.asked.insert(with, (asked, rest.to_vec()));
             }
             [] => line.note(&["a header and nothing else"]),
             _ => {
@@ -129,12 +131,22 @@ impl Explicit {
         let Some((&service, data)) = body.split_first() else {
             return line.note(&["a header and nothing else"]);
         };
-        let asked = self.asked.remove(&with);
+        let (asked, request) = self.asked.remove(&with).unzip();
         if service == Service::ERROR.response() {
             return refusal(asked.as_ref(), data, nodes.is_encoder(slave), line);
         }
         match asked {
             Some(asked) if asked.service.response() == service => {
+                line.said(Said::DeviceNet(DeviceNetSaid::Done {
+                    slave: slave.value(),
+                    master: header.mac().value(),
+                    service: asked.service.0,
+                    class: asked.class,
+                    instance: asked.instance,
+                    attribute: asked.attribute,
+                    request: request.as_deref().unwrap_or_default(),
+                    response: data,
+                }));
                 tell(&asked, nodes.is_encoder(slave), line);
                 response_data(slave, &asked, data, nodes, line);
             }

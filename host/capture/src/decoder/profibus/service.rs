@@ -36,6 +36,22 @@ impl Service {
         }
     }
 
+    /// Its service access point.
+    pub(super) const fn sap(self) -> Option<u8> {
+        Some(match self {
+            Self::DataExchange => return None,
+            Self::SetSlaveAddress => sap::SET_SLAVE_ADDRESS,
+            Self::ReadInputs => sap::READ_INPUTS,
+            Self::ReadOutputs => sap::READ_OUTPUTS,
+            Self::GlobalControl => sap::GLOBAL_CONTROL,
+            Self::GetConfiguration => sap::GET_CONFIGURATION,
+            Self::SlaveDiagnosis => sap::SLAVE_DIAGNOSIS,
+            Self::SetParameters => sap::SET_PARAMETERS,
+            Self::CheckConfiguration => sap::CHECK_CONFIGURATION,
+            Self::Other(sap) => sap,
+        })
+    }
+
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::DataExchange => "Data_Exchange",

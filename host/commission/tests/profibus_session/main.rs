@@ -1,0 +1,9 @@
+//! What people do with a PROFIBUS, on a wire in virtual time with encoders of the catalogue.
+
+mod bench;
+mod listening;
+mod preset;
+mod scan;
+mod session;
+mod stranger;
+mod trouble;

@@ -1,0 +1,82 @@
+//! What goes wrong on the way.
+
+use codewheel_commission::profibus::MasterSettings;
+use codewheel_commission::{Kind, Name, Reading, Session};
+use codewheel_station::Duration;
+
+use crate::bench::{Bench, PLC, RATE, alone};
+
+#[test]
+fn where_nobody_answers_it_is_said_what_to_look_at() {
+    let mut bench = Bench::new().with(7, "amg11-p29");
+    let trouble = bench.open(8, &alone()).unwrap_err();
+    assert_eq!((trouble.kind, trouble.came.as_str()), (Kind::TimeOut, "no answer at 1.5M"));
+    let said = bench.said;
+    bench.run(Duration::from_secs(1));
+    assert_eq!(bench.said, said, "and the master is gone");
+}
+
+#[test]
+fn an_encoder_that_its_master_left_is_let_go_by_its_watchdog_and_can_be_had() {
+    let mut bench = Bench::new().with(7, "amg11-p29").with_plc(&[7]);
+    bench.run(Duration::from_millis(500));
+    bench.unplug_plc();
+    let mut session = bench.open(7, &alone()).unwrap();
+    let steps = session.value(&Name::Key("steps-per-turn".to_owned())).unwrap();
+    assert_eq!((steps.reading, steps.writable), (Reading::Number(3_600), true));
+}
+
+#[test]
+fn without_a_watchdog_it_stays_with_the_master_that_is_gone_until_its_power_is_cycled() {
+    let plc = MasterSettings { watchdog: None, ..MasterSettings::new(PLC, RATE) };
+    let mut bench = Bench::new().with(7, "amg11-p29").with_plc_of(plc, &[7]);
+    bench.run(Duration::from_millis(500));
+    bench.unplug_plc();
+    let mut session = bench.open(7, &alone()).unwrap();
+    let steps = session.value(&Name::Key("steps-per-turn".to_owned())).unwrap();
+    assert_eq!((steps.reading, steps.writable), (Reading::Number(3_600), false));
+    let trouble = session.preset(0).unwrap_err();
+    assert_eq!((trouble.kind, trouble.came.as_str()), (Kind::Refused, "it belongs to master 2"));
+    assert!(trouble.remedy.contains("switch the encoder off and on"), "{trouble}");
+}
+
+#[test]
+fn disturbances_on_the_line_stop_no_session() {
+    let mut bench = Bench::new().with(7, "amg11-p29");
+    bench.disturb(0.01);
+    let mut session = bench.open(7, &alone()).unwrap();
+    for total in [1_000, 2_000, 3_000] {
+        let name = Name::Key("total-resolution".to_owned());
+        let value = session.write(&name, &Reading::Number(total)).unwrap();
+        assert_eq!(value.reading, Reading::Number(total));
+        assert_eq!(session.preset(500).unwrap().position, 500);
+    }
+    session.release().unwrap();
+}
+
+#[test]
+fn an_encoder_that_dies_is_a_time_out_and_nothing_hangs() {
+    let mut bench = Bench::new().with(7, "amg11-p29");
+    bench.unplug_after(Duration::from_secs(3), 7);
+    let mut session = bench.open(7, &alone()).unwrap();
+    let dies = session.now() + Duration::from_secs(3);
+    while session.now() < dies {
+        if session.sample().is_err() {
+            break;
+        }
+    }
+    let name = Name::Key("direction".to_owned());
+    for trouble in [
+        session.sample().unwrap_err(),
+        session.values().unwrap_err(),
+        session.write(&name, &Reading::Number(1)).unwrap_err(),
+        session.preset(0).unwrap_err(),
+    ] {
+        assert_eq!(trouble.kind, Kind::TimeOut, "{trouble}");
+    }
+    assert!(session.take_notices().contains(&"slave 7 does not answer".to_owned()));
+    session.release().unwrap();
+    let said = bench.said;
+    bench.run(Duration::from_secs(1));
+    assert_eq!(bench.said, said);
+}
