@@ -52,6 +52,8 @@ pub(crate) struct Bench {
     pub(crate) complaints: Vec<String>,
     /// Telegrams of the console.
     pub(crate) said: u64,
+    /// What the console sent as outputs to whom, each once in a row.
+    pub(crate) outputs: Vec<Vec<u8>>,
     /// Who is unplugged, and when.
     unplugs: Option<(Instant, u8)>,
 }
@@ -65,6 +67,18 @@ impl std::fmt::Debug for Bench {
 fn name_of(event: &Event) -> Option<String> {
     match event {
         Event::Violation { .. } | Event::Collision { .. } => Some(event.to_string()),
+        _ => None,
+    }
+}
+
+/// The outputs in a Data_Exchange: SD2, addresses without SAP, SRD.
+fn outputs_in(telegram: &[u8]) -> Option<Vec<u8>> {
+    match telegram {
+        [0x68, _, _, 0x68, 0..=0x7F, 0..=0x7F, code, outputs @ .., _, 0x16]
+            if code & 0x4F == 0x4D || code & 0x4F == 0x4C =>
+        {
+            Some(outputs.to_vec())
+        }
         _ => None,
     }
 }
@@ -85,6 +99,7 @@ impl Bench {
             devices: Vec::new(),
             complaints: Vec::new(),
             said: 0,
+            outputs: Vec::new(),
             unplugs: None,
         }
     }
@@ -193,10 +208,15 @@ impl Bench {
 
     fn run_until(&mut self, next: Instant) {
         let (console, complaints, said) = (self.console, &mut self.complaints, &mut self.said);
+        let outputs = &mut self.outputs;
         self.wire.run_until(next, &mut |event| {
             complaints.extend(name_of(event));
-            if let Event::Telegram { from, .. } = event {
-                *said += u64::from(*from == console);
+            if let Event::Telegram { from, octets, .. } = event
+                && *from == console
+            {
+                *said += 1;
+                outputs.extend(outputs_in(octets.octets()));
+                outputs.dedup();
             }
         });
     }

@@ -14,7 +14,7 @@ use crate::{Kind, Sample, Seat, Session, Trouble};
 const SEEN: u64 = 2;
 
 impl<S: Seat<Station = Console>> Encoder<S> {
-    /// Sends the preset with the clock bit low, high and low again, and looks whether it was taken.
+    /// Sends the preset twice, with the clock bit high and then low, and looks whether it was taken.
     pub(super) fn strike(&mut self, preset: u32) -> Result<Sample, Trouble> {
         let tried = format!("preset the encoder at address {} to {preset}", self.address);
         let served = match &self.standing {
@@ -39,7 +39,7 @@ impl<S: Seat<Station = Console>> Encoder<S> {
             return Err(out_of_range(tried, &served, largest));
         }
         // The slave must see the bit low first: it counts as high when the exchange begins.
-        for (value, clock) in [(0, false), (preset, true), (0, false)] {
+        for (value, clock) in [(0, false), (preset, true), (preset, false)] {
             self.put(&tried, served.configuration, value, clock)?;
         }
         let after = self.read_diagnosis(&tried)?;
