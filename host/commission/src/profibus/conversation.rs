@@ -25,6 +25,10 @@ const PATIENCE_BITS: u32 = 50_000;
 const WATCHDOG: Duration = Duration::from_secs(5);
 /// How many stations are asked with one token by a master alone.
 const IN_A_ROW: u8 = 8;
+/// How long a slave that exchanges data may say nothing until it counts as gone, besides some cycles.
+const SILENCE: Duration = Duration::from_millis(1_900);
+const SILENCE_BITS: u32 = 20_000;
+const SILENT_CYCLES: u64 = 4;
 /// A token on the line.
 const TOKEN_CHARACTERS: u32 = 3;
 /// How often progress is told while nothing happens.
@@ -62,6 +66,14 @@ impl<S: Seat<Station = Console>> Conversation<S> {
     pub(super) fn patience(&mut self) -> Instant {
         let rate = self.rate();
         self.seat.now() + PATIENCE + rate.bits(PATIENCE_BITS)
+    }
+
+    /// Until when a slave that exchanged data up to now, once in a `cycle`, may say nothing: 2 s and
+    /// four cycles from 187.5k on, 4 s at 9.6k.
+    pub(super) fn silence(&mut self, cycle: Duration) -> Instant {
+        let rate = self.rate();
+        let cycles = cycle.as_nanos().saturating_mul(SILENT_CYCLES);
+        self.seat.now() + SILENCE + rate.bits(SILENCE_BITS) + Duration::from_nanos(cycles)
     }
 
     pub(super) fn take_notices(&mut self) -> Vec<String> {
