@@ -185,8 +185,11 @@ impl<S: Seat<Station = Console>> Conversation<S> {
         let is_in = |console: &mut Console, _| {
             console.master().is_some_and(Master::is_in_ring).then_some(())
         };
-        if self.wait(until, is_in)?.is_none() {
-            self.leave()?;
+        let is_in = self.wait(until, is_in);
+        if !matches!(is_in, Ok(Some(()))) {
+            self.abandon();
+        }
+        if is_in?.is_none() {
             let came = match others.as_slice() {
                 [] => "the bus is never silent, and no master hands the token on".to_owned(),
                 [one] => format!("master {one} does not admit master {own} to its ring"),
@@ -220,6 +223,12 @@ impl<S: Seat<Station = Console>> Conversation<S> {
             (answered.address == address && answered.request == request).then_some(answered.answer)
         })?;
         Ok(answer.unwrap_or(Answer::Silence))
+    }
+
+    /// Leaves the bus, whatever went wrong before: that is what there is to hear of.
+    pub(super) fn abandon(&mut self) {
+        self.seat.wind_up();
+        let _ = self.leave();
     }
 
     /// Hands the token on and falls silent, once the token is out.

@@ -14,7 +14,7 @@ use super::identity::Told;
 use super::{
     Acyclic, Answer, Console, Diagnosis, Event, HIGHEST_ADDRESS, ScanSettings, SlaveState,
 };
-use crate::{Kind, Progress, Reading, Seat, Trouble};
+use crate::{Kind, Progress, Reading, Seat, Session, Trouble};
 
 /// How a session is opened.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -111,8 +111,9 @@ impl<S: Seat<Station = Console>> Encoder<S> {
             Self { conversation, address, standing: Standing::Foreign, sampled: Instant::ZERO };
         let opened = session.begin(&tried, settings, &overrides);
         if opened.is_err() {
+            session.conversation.seat.wind_up();
             // What went wrong before is the one to hear of.
-            let _ = session.conversation.leave();
+            let _ = session.release();
         }
         opened.map(|()| session)
     }
@@ -146,11 +147,10 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         let [_, two_words_and_preset, ..] = &configuration::ROWS;
         let configuration = settings.configuration.unwrap_or(two_words_and_preset);
         let served = Served { chosen, configuration, model, data_sheet: product.data_sheet };
+        // It may be locked as soon as parameters are on their way.
+        self.standing = Standing::Served(served);
         match self.bring_up(&served)? {
-            BroughtUp::ExchangesData => {
-                self.standing = Standing::Served(served);
-                Ok(())
-            }
+            BroughtUp::ExchangesData => Ok(()),
             BroughtUp::RefusedParameters => {
                 let given =
                     overrides.iter().map(|(row, value)| refused_remedy(&served, row, *value));
@@ -158,7 +158,13 @@ impl<S: Seat<Station = Console>> Encoder<S> {
                 let came = "it refuses its parameters (Prm_Fault)";
                 Err(Trouble::new(Kind::Refused, tried, came, remedy))
             }
-            other => Err(self.bring_up_trouble(tried, other)),
+            other => {
+                if other == BroughtUp::BelongsToAnother {
+                    // Then it is not for us to release it.
+                    self.standing = Standing::Foreign;
+                }
+                Err(self.bring_up_trouble(tried, other))
+            }
         }
     }
 

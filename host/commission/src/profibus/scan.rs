@@ -109,6 +109,19 @@ fn ask_all<S: Seat<Station = Console>>(
         return Err(trouble);
     }
     conversation.join(tried)?;
+    let asked = ask_in_ring(conversation, tried, progress);
+    if asked.is_err() {
+        conversation.abandon();
+    }
+    asked
+}
+
+/// Asks every address as a member of the ring, and leaves it.
+fn ask_in_ring<S: Seat<Station = Console>>(
+    conversation: &mut Conversation<S>,
+    tried: &str,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<BTreeMap<u8, Said>, Trouble> {
     let own = conversation.settings.address;
     let addresses = (0..=HIGHEST_ADDRESS).filter(|address| *address != own);
     let mut open = 0;

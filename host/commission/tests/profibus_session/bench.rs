@@ -56,6 +56,9 @@ pub(crate) struct Bench {
     pub(crate) outputs: Vec<Vec<u8>>,
     /// Who is unplugged, and when.
     unplugs: Option<(Instant, u8)>,
+    /// When a person wants an end.
+    interrupts: Option<fn(&Self) -> bool>,
+    is_interrupted: bool,
 }
 
 impl std::fmt::Debug for Bench {
@@ -101,6 +104,8 @@ impl Bench {
             said: 0,
             outputs: Vec::new(),
             unplugs: None,
+            interrupts: None,
+            is_interrupted: false,
         }
     }
 
@@ -262,6 +267,11 @@ impl Bench {
         self.wire.detach(id);
     }
 
+    /// Lets turns fail as soon as something is so, until what was begun is wound up.
+    pub(crate) fn interrupt_when(&mut self, is_so: fn(&Self) -> bool) {
+        self.interrupts = Some(is_so);
+    }
+
     pub(crate) fn scan(&mut self, settings: ScanSettings) -> Result<Survey, Trouble> {
         scan(self, settings, &mut |_| {})
     }
@@ -288,8 +298,19 @@ impl Seat for Bench {
     }
 
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
+        if self.interrupts.is_some_and(|is_so| is_so(self)) {
+            self.interrupts = None;
+            self.is_interrupted = true;
+        }
+        if self.is_interrupted {
+            return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
+        }
         self.step(until);
         Ok(Vec::new())
+    }
+
+    fn wind_up(&mut self) {
+        self.is_interrupted = false;
     }
 }
 
