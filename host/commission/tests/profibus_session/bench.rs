@@ -17,6 +17,7 @@ use codewheel_sim::shaft::Shaft;
 use codewheel_station::rs485::{BaudRate, Node};
 use codewheel_station::{Duration, Instant};
 
+use crate::speaker::Speaker;
 use crate::stranger::Stranger;
 
 pub(crate) const RATE: BaudRate = BaudRate::Mbit1_5;
@@ -40,7 +41,7 @@ impl Sensor for Disc {
         self.0.as_ref()?.changes_at(now)
     }
 }
-type Station = Either<Either<Console, Master>, Either<Device, Stranger>>;
+type Station = Either<Either<Console, Master>, Either<Device, Either<Stranger, Speaker>>>;
 
 /// A console on a wire.
 pub(crate) struct Bench {
@@ -182,8 +183,15 @@ impl Bench {
 
     /// A slave of somebody else's.
     pub(crate) fn with_stranger(mut self, stranger: Stranger) -> Self {
-        let station = Either::Right(Either::Right(stranger));
+        let station = Either::Right(Either::Right(Either::Left(stranger)));
         self.wire.attach("stranger", station, Attachment::default());
+        self
+    }
+
+    /// A master of somebody else's.
+    pub(crate) fn with_speaker(mut self, speaker: Speaker) -> Self {
+        let station = Either::Right(Either::Right(Either::Right(speaker)));
+        self.wire.attach("speaker", station, Attachment::default());
         self
     }
 

@@ -6,5 +6,7 @@ mod listening;
 mod preset;
 mod scan;
 mod session;
+mod speaker;
 mod stranger;
+mod tokens;
 mod trouble;
