@@ -7,10 +7,12 @@ use codewheel_station::Duration;
 
 use crate::bench::{Bench, PLC, RATE, alone, joining, quick, with_others};
 
+type IsSo = fn(&Bench) -> bool;
+
 /// At whatever step the opening is ended, the slave is free and the bus silent.
 #[test]
 fn an_encoder_whose_opening_is_interrupted_is_released_at_once() {
-    let steps: [(&str, fn(&Bench) -> bool); 3] = [
+    let steps: [(&str, IsSo); 3] = [
         ("parameterized", |bench| bench.device(7).slave().state() == State::WaitCfg),
         ("configured", |bench| bench.device(7).slave().state() == State::DataExchange),
         ("asked for its diagnosis", |bench| bench.said > 4),
@@ -34,8 +36,7 @@ fn an_encoder_whose_opening_is_interrupted_is_released_at_once() {
 fn whoever_is_interrupted_in_a_ring_hands_the_token_on() {
     let mut bench = Bench::new().with(7, "amg11-p29").with(8, "hmg10-p29").with_plc(&[7]);
     bench.run(Duration::from_millis(500));
-    let is_scanning: fn(&Bench) -> bool = |bench| bench.said > 50;
-    bench.interrupt_when(is_scanning);
+    bench.interrupt_when(|bench| bench.said > 50);
     let trouble = bench.scan(joining(RATE)).unwrap_err();
     assert!(trouble.came.contains("interrupted"), "{trouble}");
     assert!(bench.station().master().is_none());
