@@ -53,6 +53,45 @@ impl Header {
     }
 }
 
+/// How class and instance lie in requests over an explicit connection, as the slave says when it
+/// opens it (CIP volume 3, chapter 4). The unconnected port is always 8/8.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum BodyFormat {
+    /// 0: both in one octet.
+    #[default]
+    Class8Instance8,
+    /// 1: the instance in two octets.
+    Class8Instance16,
+    /// 2: both in two octets.
+    Class16Instance16,
+    /// 3: the class in two octets.
+    Class16Instance8,
+}
+
+impl BodyFormat {
+    /// The format with this number; `None` for one that is none of these, such as paths (4).
+    #[must_use]
+    pub const fn from_octet(octet: u8) -> Option<Self> {
+        Some(match octet {
+            0 => Self::Class8Instance8,
+            1 => Self::Class8Instance16,
+            2 => Self::Class16Instance16,
+            3 => Self::Class16Instance8,
+            _ => return None,
+        })
+    }
+
+    /// Whether a class, and whether an instance, has a high octet.
+    pub(crate) const fn high_octets(self) -> (bool, bool) {
+        match self {
+            Self::Class8Instance8 => (false, false),
+            Self::Class8Instance16 => (false, true),
+            Self::Class16Instance16 => (true, true),
+            Self::Class16Instance8 => (true, false),
+        }
+    }
+}
+
 /// A service code, 00 … 7F in requests. Unknown codes survive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Service(pub u8);
