@@ -15,6 +15,9 @@ pub(super) struct Stop {
     asked: Arc<AtomicBool>,
     /// Until the encoder is served there is a time limit.
     is_limited: Arc<AtomicBool>,
+    /// Why what was being opened is given up, while what was begun is undone.
+    was_asked: Arc<AtomicBool>,
+    was_late: Arc<AtomicBool>,
     deadline: Option<std::time::Instant>,
 }
 
@@ -22,17 +25,37 @@ impl Stop {
     /// `asked` is set by Ctrl-C, `limit` is how long opening may take.
     pub(super) fn new(asked: Arc<AtomicBool>, limit: Option<Duration>) -> Self {
         let deadline = limit.and_then(|limit| std::time::Instant::now().checked_add(limit));
-        Self { asked, is_limited: Arc::new(AtomicBool::new(true)), deadline }
+        let (was_asked, was_late) = <(Arc<AtomicBool>, Arc<AtomicBool>)>::default();
+        Self { asked, is_limited: Arc::new(AtomicBool::new(true)), was_asked, was_late, deadline }
     }
 
     /// Whether what is under way must end.
     pub(super) fn is_wanted(&self) -> bool {
-        self.was_asked() || self.left().is_some_and(|left| left.is_zero())
+        self.asked.load(Ordering::Relaxed) || self.is_late()
     }
 
     /// Whether a person asked for it.
     pub(super) fn was_asked(&self) -> bool {
-        self.asked.load(Ordering::Relaxed)
+        self.asked.load(Ordering::Relaxed) || self.was_asked.load(Ordering::Relaxed)
+    }
+
+    /// Whether the time to get on the bus was over.
+    pub(super) fn was_late(&self) -> bool {
+        self.is_late() || self.was_late.load(Ordering::Relaxed)
+    }
+
+    /// Lets what was begun be undone in an orderly way; a second Ctrl-C wants an end anew.
+    fn wind_up(&self) {
+        if self.is_late() {
+            self.was_late.store(true, Ordering::Relaxed);
+        }
+        if self.take() {
+            self.was_asked.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn is_late(&self) -> bool {
+        self.left().is_some_and(|left| left.is_zero())
     }
 
     /// What was to be opened is open: from now on each request has its own limit.
@@ -87,5 +110,9 @@ impl<S: Seat> Seat for Stoppable<S> {
             None => until,
         };
         self.seat.turn(until)
+    }
+
+    fn wind_up(&mut self) {
+        self.stop.wind_up();
     }
 }

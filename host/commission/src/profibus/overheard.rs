@@ -28,9 +28,21 @@ pub struct HeardMaster {
     pub rotation: CycleTimes,
     /// How often it asked somebody.
     pub requests: u64,
+    /// How often it looked for a station where none was heard, by its FDL status: other masters (GAP),
+    /// or a slave that is not there.
+    pub searches: u64,
     /// When it was heard last.
     pub at: Instant,
     token_at: Option<Instant>,
+}
+
+impl HeardMaster {
+    /// Whether it hands on a token. Of a master that says nothing else it takes a few of them, since
+    /// noise may look like one.
+    #[must_use]
+    pub const fn is_in_ring(&self) -> bool {
+        self.tokens >= CERTAIN_TOKENS || (self.tokens > 0 && self.requests > 0)
+    }
 }
 
 /// Parameters or a configuration on their way to a slave.
@@ -222,10 +234,13 @@ impl Overheard {
     fn request(&mut self, now: Instant, data: &Data<'_>) {
         let (from, to) = (data.source(), data.destination());
         self.asked = None;
+        let function = data.function_code().function();
+        let searches = function == Some(Function::FdlStatus) && !self.slaves.contains_key(&to);
         if let Some(master) = self.master(now, from) {
             master.requests += 1;
+            master.searches += u64::from(searches);
         }
-        let what = match data.function_code().function() {
+        let what = match function {
             Some(Function::FdlStatus) => What::FdlStatus,
             Some(Function::SrdLow | Function::SrdHigh) => match data.saps() {
                 Ok(None) => What::DataExchange,

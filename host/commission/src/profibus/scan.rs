@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use codewheel_device::product::Bus;
 use codewheel_station::Duration;
 
-use super::conversation::{Conversation, gibberish, list, percent};
+use super::conversation::{Conversation, gibberish, percent};
 use super::identity::Told;
 use super::{
     Acyclic, Answer, Answered, Console, Diagnosis, HIGHEST_ADDRESS, HeardSlave, Overheard,
@@ -40,8 +40,14 @@ impl Default for ScanSettings {
 /// it asks every address for its FDL status and every slave for its diagnosis, which disturbs no
 /// exchange of data, and is gone again from the ring.
 ///
+/// Where masters ask and none hands on a token, it listens for 5 s and 100 000 bits, 15 s at 9.6k; 10 s
+/// and 400 000 bits where one looks for others. A master without token cannot be joined: its pauses
+/// are no lost token. One that holds its token longer, or says nothing for a second, is not known for
+/// what it is; listen longer before, where there may be such.
+///
 /// # Errors
-/// [`Trouble`]: the bus is lost, the own address is taken, or the ring does not admit another master.
+/// [`Trouble`]: the bus is lost, the own address is taken, no token goes round that could be shared, or
+/// the ring does not admit another master.
 pub fn scan(
     seat: &mut impl Seat<Station = Console>,
     settings: ScanSettings,
@@ -49,6 +55,7 @@ pub fn scan(
 ) -> Result<Survey, Trouble> {
     let mut conversation = Conversation::new(seat, settings);
     conversation.listen(progress)?;
+    conversation.listen_for_a_token(progress)?;
     let mut remarks = Vec::new();
     let mut asked = BTreeMap::new();
     let masters = conversation.masters();
@@ -67,14 +74,14 @@ pub fn scan(
         ));
     }
     if !masters.is_empty() && !settings.join {
-        let (are, they) = match masters.as_slice() {
-            [one] => (format!("master {one} is"), "it"),
-            _ => (format!("masters {} are", list(&masters)), "them"),
+        let are = conversation.masters_in_words();
+        let they = if masters.len() == 1 { "it" } else { "them" };
+        let further = if conversation.is_ring_heard() {
+            format!("to take turns with {they} and ask every address, join the ring (--join)")
+        } else {
+            format!("{}, so nobody can take turns with {they}", conversation.no_token())
         };
-        remarks.push(format!(
-            "{are} on the bus, so nothing was asked: this is what was overheard; to take turns with \
-             {they} and ask every address, join the ring (--join)"
-        ));
+        remarks.push(format!("{are}, so nothing was asked: this is what was overheard; {further}"));
     } else if !is_gibberish {
         asked = ask_all(&mut conversation, progress)?;
         let console = conversation.console();
@@ -108,7 +115,23 @@ fn ask_all<S: Seat<Station = Console>>(
     if let Some(trouble) = conversation.address_trouble(tried) {
         return Err(trouble);
     }
+    if let Some(trouble) = conversation.ring_trouble(tried) {
+        return Err(trouble);
+    }
     conversation.join(tried)?;
+    let asked = ask_in_ring(conversation, tried, progress);
+    if asked.is_err() {
+        conversation.abandon();
+    }
+    asked
+}
+
+/// Asks every address as a member of the ring, and leaves it.
+fn ask_in_ring<S: Seat<Station = Console>>(
+    conversation: &mut Conversation<S>,
+    tried: &str,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<BTreeMap<u8, Said>, Trouble> {
     let own = conversation.settings.address;
     let addresses = (0..=HIGHEST_ADDRESS).filter(|address| *address != own);
     let mut open = 0;
@@ -181,6 +204,7 @@ fn nodes(overheard: &Overheard, asked: &BTreeMap<u8, Said>, own: u8) -> Vec<Foun
     for (address, master) in overheard.masters() {
         let rotation = master.rotation;
         let state = match (master.tokens, rotation.count) {
+            (0, _) if master.searches > 0 => "looks for others, no token was heard".to_owned(),
             (0, _) => "asks without a token".to_owned(),
             (_, 0) => "in the ring".to_owned(),
             _ => format!(

@@ -1,10 +1,11 @@
 //! What goes wrong on the way.
 
-use codewheel_commission::profibus::MasterSettings;
+use codewheel_commission::profibus::{MasterSettings, SessionSettings};
 use codewheel_commission::{Kind, Name, Reading, Session};
 use codewheel_station::Duration;
+use codewheel_station::rs485::BaudRate;
 
-use crate::bench::{Bench, PLC, RATE, alone};
+use crate::bench::{Bench, PLC, RATE, alone, quick};
 
 #[test]
 fn where_nobody_answers_it_is_said_what_to_look_at() {
@@ -59,12 +60,13 @@ fn an_encoder_that_dies_is_a_time_out_and_nothing_hangs() {
     let mut bench = Bench::new().with(7, "amg11-p29");
     bench.unplug_after(Duration::from_secs(3), 7);
     let mut session = bench.open(7, &alone()).unwrap();
-    let dies = session.now() + Duration::from_secs(3);
-    while session.now() < dies {
-        if session.sample().is_err() {
-            break;
+    let last = loop {
+        match session.sample() {
+            Ok(sample) => assert!(sample.cycle.is_some()),
+            Err(trouble) => break trouble,
         }
-    }
+    };
+    assert_eq!(last.kind, Kind::TimeOut);
     let name = Name::Key("direction".to_owned());
     for trouble in [
         session.sample().unwrap_err(),
@@ -79,4 +81,29 @@ fn an_encoder_that_dies_is_a_time_out_and_nothing_hangs() {
     let said = bench.said;
     bench.run(Duration::from_secs(1));
     assert_eq!(bench.said, said);
+}
+
+/// Its watchdog has nothing to do with it: that is the slave's.
+#[test]
+fn a_slave_that_says_no_more_is_told_after_two_seconds_or_longer_at_slow_rates() {
+    for (rate, most) in [(RATE, 2_100), (BaudRate::Kbit187_5, 2_200), (BaudRate::Kbit9_6, 5_000)] {
+        let mut bench = Bench::at(rate).with(7, "amg11-p29");
+        bench.unplug_after(Duration::from_secs(10), 7);
+        let settings = SessionSettings { master: quick(rate), ..alone() };
+        let mut session = bench.open(7, &settings).unwrap();
+        let mut heard = session.now();
+        let trouble = loop {
+            match session.sample() {
+                Ok(sample) => heard = sample.at,
+                Err(trouble) => break trouble,
+            }
+        };
+        assert_eq!(trouble.kind, Kind::TimeOut, "{trouble}");
+        let silence = session.now().since(heard);
+        let (least, most) = (Duration::from_millis(1_900), Duration::from_millis(most));
+        assert!(silence >= least && silence < most, "{silence} at {rate}");
+        let told = session.now();
+        session.release().unwrap();
+        assert!(session.now().since(told) < Duration::from_millis(500), "{rate}");
+    }
 }
