@@ -31,6 +31,19 @@ fn polls_are_begun_and_ended_while_the_explicit_connection_stays() {
 }
 
 #[test]
+fn a_slave_that_is_removed_while_its_polls_end_loses_both_connections() {
+    let mut bench = Bench::running(Peer::new(5), SlaveSettings::explicit(mac(5)));
+    let poll = PollSettings { expected_packet_rate: 200, assembly: None };
+    bench.scanner.begin_polling(mac(5), poll).unwrap();
+    bench.run(millis(100));
+    bench.scanner.end_polling(mac(5)).unwrap();
+    bench.scanner.remove(mac(5));
+    let before = bench.peer().asked.len();
+    bench.run(millis(100));
+    assert_eq!(bench.peer().asked[before..], ["u4C030102", "u4C030101"]);
+}
+
+#[test]
 fn a_poll_connection_of_an_earlier_life_is_released_before_polls_begin() {
     let mut bench = Bench::running(Peer::new(5), SlaveSettings::explicit(mac(5)));
     bench.peer().rule("4B03010200", Some("940B02"));

@@ -2,6 +2,7 @@
 //! all that can go wrong.
 
 mod liar;
+mod interruptions;
 mod listening;
 mod other_devices;
 mod other_masters;

@@ -70,7 +70,11 @@ impl Slave {
             if index == 0 {
                 self.repeats = 0;
                 return match then {
-                    Then::Allocate | Then::Resume => self.leave(now, RETRY_TIME),
+                    Then::Allocate => self.leave(now, RETRY_TIME),
+                    Then::Resume => {
+                        self.settings.poll = None;
+                        self.leave(now, RETRY_TIME);
+                    }
                     Then::Leave => self.leave(now, REFUSED_TIME),
                     Then::Vanish => self.phase = Phase::Gone,
                 };
@@ -83,7 +87,10 @@ impl Slave {
         if self.exchange.is_idle() {
             match then {
                 Then::Allocate => {}
-                Then::Resume => self.begin_exchanging_data(now),
+                Then::Resume => {
+                    self.settings.poll = None;
+                    self.begin_exchanging_data(now);
+                }
                 Then::Leave => {
                     self.held = Held::Nothing;
                     self.leave(now, REFUSED_TIME);

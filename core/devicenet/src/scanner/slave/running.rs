@@ -128,7 +128,6 @@ impl Slave {
     /// Releases the poll connection, and keeps what else there is.
     pub(in super::super) fn end_polling(&mut self) -> Result<(), NotTaken> {
         self.expect_unasked()?;
-        self.settings.poll = None;
         self.settle();
         self.release_from(0, Then::Resume);
         Ok(())

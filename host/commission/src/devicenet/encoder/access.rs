@@ -91,11 +91,21 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         self.leave_io(tried)?;
         let own = self.dialogue.console().mac().map_or(0, MacId::value);
         let allocate = [Service::ALLOCATE.0, class::DEVICENET, 1, choice, own];
-        if let Err(error) = self.serve(tried, &allocate, ANSWER_TIME)? {
-            return Ok(Err(error));
+        let release = [Service::RELEASE.0, class::DEVICENET, 1, choice];
+        match self.serve(tried, &allocate, ANSWER_TIME) {
+            Ok(Ok(_)) => {}
+            Ok(Err(error)) => return Ok(Err(error)),
+            Err(trouble) => {
+                // It may have been done, though nobody has seen the answer.
+                self.dialogue.wind_up();
+                let _ = self.serve(tried, &release, ANSWER_TIME);
+                return Err(trouble);
+            }
         }
         let result = act(self);
-        let release = [Service::RELEASE.0, class::DEVICENET, 1, choice];
+        if result.is_err() {
+            self.dialogue.wind_up();
+        }
         let released = self.serve(tried, &release, ANSWER_TIME);
         let result = result?;
         released?.map_err(|error| troubles::refused(tried, error))?;
