@@ -294,7 +294,9 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
             let Some(scanner) = console.scanner_mut() else { return Some(Err(NotTaken::OffLine)) };
             match change(scanner) {
                 // It was lost and is being brought back.
-                Err(NotTaken::NotRunning | NotTaken::OffLine) if scanner.faulted().is_none() => None,
+                Err(NotTaken::NotRunning | NotTaken::OffLine) if scanner.faulted().is_none() => {
+                    None
+                }
                 result => Some(result),
             }
         })?;

@@ -35,9 +35,8 @@ fn an_end_while_a_device_is_opened_releases_it() {
 
 #[test]
 fn an_end_while_the_bus_is_scanned_releases_who_is_asked() {
-    let (interrupted, ours) = at_every_turn(|seat| {
-        scan(seat, ScanSettings::default(), &mut unheard).map(|_| ())
-    });
+    let (interrupted, ours) =
+        at_every_turn(|seat| scan(seat, ScanSettings::default(), &mut unheard).map(|_| ()));
     assert!(interrupted > ours && ours > 20, "{ours} of {interrupted}");
 }
 

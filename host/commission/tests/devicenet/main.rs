@@ -1,8 +1,8 @@
 //! Commissioning on a DeviceNet segment in virtual time: real encoders, other people's masters, and
 //! all that can go wrong.
 
-mod liar;
 mod interruptions;
+mod liar;
 mod listening;
 mod other_devices;
 mod other_masters;

@@ -92,24 +92,22 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         let own = self.dialogue.console().mac().map_or(0, MacId::value);
         let allocate = [Service::ALLOCATE.0, class::DEVICENET, 1, choice, own];
         let release = [Service::RELEASE.0, class::DEVICENET, 1, choice];
-        match self.serve(tried, &allocate, ANSWER_TIME) {
-            Ok(Ok(_)) => {}
+        let result = match self.serve(tried, &allocate, ANSWER_TIME) {
+            Ok(Ok(_)) => act(self),
             Ok(Err(error)) => return Ok(Err(error)),
-            Err(trouble) => {
-                // It may have been done, though nobody has seen the answer.
-                self.dialogue.wind_up();
-                let _ = self.serve(tried, &release, ANSWER_TIME);
-                return Err(trouble);
-            }
-        }
-        let result = act(self);
+            // It may have been done, though nobody has seen the answer.
+            Err(trouble) => Err(trouble),
+        };
+        let result = result.and_then(|result| {
+            let released = self.serve(tried, &release, ANSWER_TIME)?;
+            released.map_err(|error| troubles::refused(tried, error))?;
+            Ok(result)
+        });
         if result.is_err() {
             self.dialogue.wind_up();
+            let _ = self.serve(tried, &release, ANSWER_TIME);
         }
-        let released = self.serve(tried, &release, ANSWER_TIME);
-        let result = result?;
-        released?.map_err(|error| troubles::refused(tried, error))?;
-        Ok(result)
+        result
     }
 
     pub(super) fn set(
