@@ -101,7 +101,8 @@ fn a_device_that_dies_in_the_middle_is_a_time_out() {
     let mut session = seat.open(5).unwrap();
     let begun = session.now();
     is(&session.values().unwrap_err(), Kind::TimeOut, "does not answer any more");
-    assert!(session.now().since(begun) < secs(3));
+    // It may take 2.5 s to answer; then it is asked twice whether it is there.
+    assert!(session.now().since(begun) < secs(4));
     is(&session.values().unwrap_err(), Kind::TimeOut, "does not answer any more");
     is(&session.sample().unwrap_err(), Kind::TimeOut, "");
     let begun = session.now();
