@@ -199,7 +199,11 @@ fn look_at<S: Seat<Station = Console>>(
             node.state = state_of_free(known.status);
             node.identity = Some(known.identity);
         }
-        Err(trouble) if trouble.kind == Kind::Bus => return Err(trouble),
+        Err(trouble) if trouble.kind == Kind::Bus => {
+            // What went wrong before is what people must hear.
+            let _ = dialogue.release(&tried, mac);
+            return Err(trouble);
+        }
         Err(trouble) if trouble.kind == Kind::Refused => {
             node.role = Role::Slave;
             let master = dialogue.console().overheard().node(mac).master;

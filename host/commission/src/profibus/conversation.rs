@@ -173,7 +173,12 @@ impl<S: Seat<Station = Console>> Conversation<S> {
         let is_in = |console: &mut Console, _| {
             console.master().is_some_and(Master::is_in_ring).then_some(())
         };
-        if self.wait(until, is_in)?.is_none() {
+        let is_in = self.wait(until, is_in);
+        if is_in.is_err() {
+            // What went wrong before is the one to hear of.
+            let _ = self.leave();
+        }
+        if is_in?.is_none() {
             self.leave()?;
             let came = match others.as_slice() {
                 [] => "the bus is never silent, and no master hands the token on".to_owned(),

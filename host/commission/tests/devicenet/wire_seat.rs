@@ -44,6 +44,10 @@ pub(crate) struct WireSeat {
     pub(crate) frames: Vec<(Instant, NodeId, Frame)>,
     /// Whether the port says that it is lost for good.
     pub(crate) is_lost: bool,
+    /// Whether the next turn fails because a person wants an end.
+    is_interrupted: bool,
+    /// So many frames after this address was allocated it does.
+    interruption: Option<(u8, usize)>,
     /// Whether the memories of encoders take what they are given, and how long that lasts.
     pub(crate) has_memory: bool,
     pub(crate) memory_time: Duration,
@@ -60,6 +64,8 @@ impl WireSeat {
             console,
             frames: Vec::new(),
             is_lost: false,
+            is_interrupted: false,
+            interruption: None,
             has_memory: true,
             memory_time: Duration::ZERO,
             agenda: Vec::new(),
@@ -128,6 +134,25 @@ impl WireSeat {
         let at = self.wire.now() + span;
         let place = self.agenda.partition_point(|(other, _)| *other > at);
         self.agenda.insert(place, (at, Box::new(act)));
+    }
+
+    /// Has a person want an end so many frames after the encoder at `address` was allocated.
+    pub(crate) fn interrupt_after_allocation(&mut self, address: u8, frames: usize) {
+        self.interruption = Some((address, frames));
+    }
+
+    fn interrupt(&mut self) {
+        let Some((address, frames)) = self.interruption else { return };
+        let answers = format!("{:03X}#", 0x400 | u16::from(address) << 3 | 3);
+        let place = self.frames.iter().position(|(_, _, frame)| {
+            let frame = frame.to_string();
+            // CB: the response to Allocate.
+            frame.starts_with(&answers) && frame.get(6..8) == Some("CB")
+        });
+        if place.is_some_and(|place| self.frames.len() > place + frames) {
+            self.is_interrupted = true;
+            self.interruption = None;
+        }
     }
 
     /// Lets `span` pass.
@@ -214,6 +239,10 @@ impl Seat for WireSeat {
         if self.is_lost {
             let reason = "the other side closed it".to_owned();
             return Err(LinkError::Lost { bus: "slcan:127.0.0.1:4001".to_owned(), reason });
+        }
+        self.interrupt();
+        if std::mem::take(&mut self.is_interrupted) {
+            return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
         }
         self.step(until);
         Ok(Vec::new())

@@ -52,6 +52,8 @@ pub(crate) struct Bench {
     pub(crate) complaints: Vec<String>,
     /// Telegrams of the console.
     pub(crate) said: u64,
+    /// How many telegrams of the console a person lets pass before they want an end.
+    pub(crate) patience: Option<u64>,
     /// Who is unplugged, and when.
     unplugs: Option<(Instant, u8)>,
 }
@@ -85,6 +87,7 @@ impl Bench {
             devices: Vec::new(),
             complaints: Vec::new(),
             said: 0,
+            patience: None,
             unplugs: None,
         }
     }
@@ -268,6 +271,9 @@ impl Seat for Bench {
     }
 
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
+        if self.patience.take_if(|patience| *patience < self.said).is_some() {
+            return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
+        }
         self.step(until);
         Ok(Vec::new())
     }
