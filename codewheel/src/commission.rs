@@ -24,6 +24,7 @@ mod watch;
 
 use std::process::ExitCode;
 
+use codewheel_device::product::Bus;
 use serde::Serialize;
 
 use self::encoder::Encoder;
@@ -117,7 +118,10 @@ fn serve(
     service: Service,
     chatter: Chatter,
 ) -> Result<ExitCode, Failure> {
-    let served = writing(&arguments.encoder, arguments.consent, chatter, |encoder| {
+    // PROFIBUS has no such service: it is refused, and nobody need consent to that.
+    let is_refused = bus::of(&arguments.encoder.bus) == Some(Bus::Profibus);
+    let consent = Consent { yes: arguments.consent.yes || is_refused };
+    let served = writing(&arguments.encoder, consent, chatter, |encoder| {
         service::run(encoder, arguments, service)
     });
     end(served, arguments.format.json)

@@ -69,19 +69,24 @@ fn uri(arguments: &BusArguments) -> Result<&BusUri, Failure> {
     })
 }
 
+/// The bus that was meant, where its URI says it.
+pub(super) fn of(arguments: &BusArguments) -> Option<Bus> {
+    match arguments.bus.as_ref()?.medium() {
+        Medium::Can => Some(Bus::DeviceNet),
+        Medium::Rs485 => Some(Bus::Profibus),
+        Medium::Any => None,
+    }
+}
+
 /// Which bus a port leads to.
 fn which(arguments: &BusArguments, uri: &BusUri) -> Result<Bus, Failure> {
-    let bus = match uri.medium() {
-        Medium::Can => Bus::DeviceNet,
-        Medium::Rs485 => Bus::Profibus,
-        Medium::Any => {
-            return Err(Failure::Usage(format!(
-                "{uri} is a bus inside another process, which nobody joins from here: let that \
-                 process listen, on slcan-listen:127.0.0.1:4001 or rs485-listen:127.0.0.1:4002, and \
-                 write slcan:127.0.0.1:4001 or rs485:127.0.0.1:4002 here"
-            )));
-        }
-    };
+    let bus = of(arguments).ok_or_else(|| {
+        Failure::Usage(format!(
+            "{uri} is a bus inside another process, which nobody joins from here: let that process \
+             listen, on slcan-listen:127.0.0.1:4001 or rs485-listen:127.0.0.1:4002, and write \
+             slcan:127.0.0.1:4001 or rs485:127.0.0.1:4002 here"
+        ))
+    })?;
     if bus == Bus::DeviceNet && arguments.join {
         return Err(Failure::Usage(
             "--join is for the token ring of PROFIBUS; on DeviceNet masters need not know each other"
@@ -126,7 +131,7 @@ fn opened<T>(result: Result<T, Trouble>, stop: &Stop) -> Result<T, Failure> {
         if stop.was_asked() {
             return Failure::Interrupted;
         }
-        if !stop.was_late() {
+        if !stop.is_wanted() {
             return trouble.into();
         }
         let came = "the time given with --timeout was over before";

@@ -24,33 +24,37 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
         Reading::Number(steps) => u32::try_from(steps).ok().filter(|steps| *steps > 0),
         _ => None,
     });
-    let first = encoder.session.sample()?.position;
-    let before = encoder.session.sample()?.position;
-    let is_turning = first != before;
-    let wanted = match (arguments.value, arguments.by, range) {
-        (Some(value), _, _) => value,
-        (None, Some(by), Some(range)) => moved(before, by, range),
-        (None, _, _) => {
-            return Err(Failure::Usage(
-                "this device does not tell its measuring range, so nobody knows where the position \
-                 wraps: give the position itself, as in `codewheel preset 1000`"
-                    .to_owned(),
-            ));
-        }
+    let wanted = |position| match (arguments.value, arguments.by, range) {
+        (Some(value), _, _) => Ok(value),
+        (None, Some(by), Some(range)) => Ok(moved(position, by, range)),
+        (None, _, _) => Err(Failure::Usage(
+            "this device does not tell its measuring range, so nobody knows where the position \
+             wraps: give the position itself, as in `codewheel preset 1000`"
+                .to_owned(),
+        )),
     };
-    encoder.propose(&format!("position: {before} → {wanted} step"), arguments.consent);
+    let (shown, is_turning) = look(encoder)?;
+    encoder.propose(&format!("position: {shown} → {} step", wanted(shown)?), arguments.consent);
     if is_turning {
         encoder.say("the shaft turns: the position of the moment in which it arrives becomes that");
     }
     arguments.consent.ask("Preset it?", encoder)?;
+    let offset_before = offset(encoder)?;
+    // A person takes their time, and a shaft turns meanwhile. This is the last thing asked before.
+    let (before, turned) = look(encoder)?;
+    let is_turning = is_turning || turned || before.abs_diff(shown) > 1;
+    let wanted = wanted(before)?;
     let sample = encoder.session.preset(wanted)?;
-    let undo = match range {
+    // What is done is done, and told, also where nobody answers any more.
+    let offset_after = offset(encoder).unwrap_or_default();
+    let ring = range.map_or(0, i64::from);
+    let made =
+        offset_before.zip(offset_after).map(|(before, after)| shortest(after - before, ring));
+    let undo = match (range, made) {
         // Wherever the shaft stands then.
-        Some(range) => {
-            let by = shortest(i64::from(before) - i64::from(wanted), range.into()).to_string();
-            command(&["preset", "--by", &by], encoder.at)
-        }
-        None => command(&["preset", &before.to_string()], encoder.at),
+        (Some(_), Some(made)) => by(shortest(-made, ring), encoder),
+        (Some(_), None) => by(shortest(i64::from(before) - i64::from(wanted), ring), encoder),
+        (None, _) => command(&["preset", &before.to_string()], encoder.at),
     };
     let undo = [undo];
     let mut out = std::io::stdout().lock();
@@ -60,10 +64,14 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
     } else {
         writeln!(out, "position: {before} → {} step", sample.position)?;
     }
+    if let (Some(wanted), Some(made)) = (arguments.by, made)
+        && shortest(wanted, ring) != made
+    {
+        encoder.say(&format!("the shaft turned on meanwhile: positions are moved by {made} step"));
+    }
     tell_undo(&undo, encoder);
     tell_how_long(encoder);
-    let off = i64::from(sample.position) - i64::from(wanted);
-    let off = shortest(off, range.map_or(0, i64::from));
+    let off = shortest(i64::from(sample.position) - i64::from(wanted), ring);
     // A shaft that stands may stand between two steps.
     if is_turning || off.abs() <= 1 {
         return Ok(());
@@ -75,4 +83,24 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
         "if the shaft has moved meanwhile, stop it and do it again",
     )
     .into())
+}
+
+/// The position now, and whether the shaft turns. The first sample may have come a while ago.
+fn look(encoder: &mut Encoder) -> Result<(u32, bool), Trouble> {
+    let first = encoder.session.sample()?.position;
+    let now = encoder.session.sample()?.position;
+    Ok((now, now != first))
+}
+
+/// What presets have added to the scaled code, where the device tells it.
+fn offset(encoder: &mut Encoder) -> Result<Option<i64>, Trouble> {
+    Ok(encoder.find("offset")?.and_then(|value| match value.reading {
+        Reading::Number(steps) => Some(steps),
+        _ => None,
+    }))
+}
+
+/// The command that moves all positions by so many steps.
+fn by(steps: i64, encoder: &Encoder) -> String {
+    command(&["preset", "--by", &steps.to_string()], encoder.at)
 }

@@ -8,8 +8,12 @@ use codewheel_device::product::Bus;
 use codewheel_device::profibus::parameters::{Field, Row};
 use serde::Serialize;
 
+use super::command_line::command;
 use super::encoder::Encoder;
-use super::settings::{Change, ChangeLine, Settings, tell_how_long_it_lasts, tell_undo};
+use super::settings::{
+    Change, ChangeLine, STEPS_PER_TURN, Settings, TOTAL_RESOLUTION, tell_how_long_it_lasts,
+    tell_undo,
+};
 use super::value;
 use crate::arguments::commission::SetArguments;
 use crate::failure::Failure;
@@ -68,11 +72,15 @@ pub(super) fn run(
     }
     let before = Settings::of(encoder)?;
     arguments.consent.ask("Write it?", encoder)?;
-    let after_write = encoder
-        .session
-        .write(name, &wanted)
-        .map_err(|trouble| with_range(trouble, encoder, &old, &wanted))?;
-    let after = Settings::of(encoder)?;
+    let after_write = match encoder.session.write(name, &wanted) {
+        Ok(value) => value,
+        Err(trouble) => {
+            tell_doubt(&trouble, &before, &old, encoder);
+            return Err(with_range(trouble, encoder, &old, &wanted).into());
+        }
+    };
+    let after =
+        Settings::of(encoder).inspect_err(|trouble| tell_doubt(trouble, &before, &old, encoder))?;
     let undo = before.undo(&after, encoder);
     let mut changes = before.changes(&after);
     changes.retain(|change| change.after.name != old.name);
@@ -98,6 +106,7 @@ pub(super) fn run(
     if after_write.reading == wanted {
         return Ok(());
     }
+    let is_scale = [STEPS_PER_TURN, TOTAL_RESOLUTION].contains(&old.name.as_str());
     Err(Trouble::new(
         Kind::Differs,
         format!("write {} of the encoder at address {}", old.name, encoder.session.address()),
@@ -106,9 +115,24 @@ pub(super) fn run(
             value::plain(&wanted),
             value::plain(&after_write.reading)
         ),
-        "another master may have written too: look who is on the bus with `codewheel scan`",
+        if is_scale && after.is_unscaled() {
+            "it counts with its whole disc, since class 2 or scaling is off: set them on first, or \
+             with it, as in --parameter scaling=on"
+        } else {
+            "another master may have written too: look who is on the bus with `codewheel scan`"
+        },
     )
     .into())
+}
+
+/// Where nobody answers any more, a write may have been done all the same.
+fn tell_doubt(trouble: &Trouble, before: &Settings, old: &Value, encoder: &Encoder) {
+    if matches!(trouble.kind, Kind::Refused | Kind::Usage) {
+        return;
+    }
+    encoder.say(&format!("it may have been written; before it was: {}", before.summary()));
+    let old_value = value::writable(encoder.session.bus(), old);
+    tell_undo(&[command(&["set", &old.name, &old_value], encoder.at)], encoder);
 }
 
 /// On PROFIBUS steps per turn and total resolution come together, and the second may be too much for

@@ -154,6 +154,33 @@ fn encoders_of_both_buses_are_found_set_saved_and_replaced_across_a_power_cut() 
     assert_eq!(plant.position("6"), 33 * 8_192);
 }
 
+#[test]
+fn on_profibus_one_command_undoes_a_change_and_the_offset_comes_back_with_the_parameters() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plant = Plant::start(folder.path());
+    let scaled = ["--parameter", "total-resolution=6000"];
+    plant.does(&[&["set", "steps-per-turn", "100", "--yes"][..], &scaled].concat(), "7");
+    plant.does(&["preset", "77", "--yes"], "7");
+    let before = plant.does(&["get", "--json"], "7");
+    for change in [
+        &["set", "direction", "ccw"][..],
+        &["set", "class-2", "off"],
+        &["set", "scaling", "off"],
+        &["preset", "5999"],
+    ] {
+        let done = plant.does(&[change, &["--yes", "--json"]].concat(), "7");
+        assert_ne!(plant.does(&["get", "--json"], "7"), before, "{change:?}");
+        let done: Value = serde_json::from_str(&done).expect("JSON");
+        let [undo] = done["undo"].as_array().expect("commands").as_slice() else {
+            panic!("{change:?}: {done}")
+        };
+        let words = shlex::split(undo.as_str().expect("text")).expect("words of a shell");
+        let words: Vec<&str> = words.iter().map(String::as_str).skip(1).collect();
+        printed(&[&words[..], &["--yes"]].concat());
+        assert_eq!(plant.does(&["get", "--json"], "7"), before, "{change:?}: {undo}");
+    }
+}
+
 /// An encoder on a free TCP port, as `--bus` names it.
 fn encoder() -> (Running, String) {
     let (running, address) = Running::encoder("amg11-d29", &["--shaft", "still angle=1000"]);
@@ -221,6 +248,24 @@ fn a_person_at_a_terminal_is_asked_and_only_yes_writes() {
     let seen = asked.end_with(None, 0);
     assert!(seen.contains("undo: codewheel preset --by 993"), "{seen}");
     assert_eq!(position(), "7\n");
+}
+
+#[test]
+fn a_shaft_that_turned_while_a_person_thought_is_moved_by_what_was_asked_for_alone() {
+    let (_encoder, address) = Running::encoder("amg11-d29", &["--shaft", "turn rpm=60"]);
+    let bus = format!("slcan:{address}");
+    let at = ["--bus", &bus, "--address", "5", "--by", "5"];
+    let mut asked = Terminal::start_with_keyboard(&[&["preset"], &at[..]].concat());
+    asked.read_until("Preset it? [y/N] ");
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    asked.press("y\n");
+    let seen = asked.end_with(None, 0);
+    let by = seen.split("undo: codewheel preset --by ").nth(1).and_then(|it| it.split(' ').next());
+    let by: i64 = by.and_then(|by| by.parse().ok()).unwrap_or_else(|| panic!("{seen}"));
+    // Two turns were 16384 steps.
+    assert!((by + 5).abs() < 4_096, "{seen}");
+    let offset = printed(&["get", "offset", "--bus", &bus, "--address", "5"]);
+    assert_eq!(offset.trim().parse(), Ok(-by), "what is undone is what was done");
 }
 
 #[test]

@@ -56,7 +56,8 @@ pub(super) fn modulo(value: i64, total: u32) -> u32 {
 /// The preset that makes the offset `wanted`, mod `total`, of an encoder that is at `position` with
 /// `offset`.
 pub(super) fn preset_for(wanted: i64, position: u32, offset: i64, total: u32) -> u32 {
-    modulo(i64::from(position).saturating_sub(offset).saturating_add(wanted), total)
+    let [scaled, wanted] = [i64::from(position).saturating_sub(offset), wanted];
+    modulo(i64::from(modulo(scaled, total)) + i64::from(modulo(wanted, total)), total)
 }
 
 #[cfg(test)]
@@ -74,7 +75,7 @@ mod tests {
     #[test]
     fn a_preset_brings_an_offset_back_from_anywhere() {
         for total in [1_u32, 7, 3_600, 3_601, 1 << 29] {
-            for wanted in [0, 5, -5, i64::from(total) - 1, 1 - i64::from(total)] {
+            for wanted in [0, 5, -5, 1 - i64::from(total), i64::MIN, i64::MAX] {
                 for scaled in [0, total / 2, total - 1] {
                     for offset in [0, 3, -2] {
                         let position = modulo(i64::from(scaled) + offset, total);

@@ -74,6 +74,9 @@ pub struct Plan {
 /// turn set the total resolution (AMG manual §8).
 const GEOMETRY: [&str; 3] = ["direction", STEPS_PER_TURN, TOTAL_RESOLUTION];
 
+/// By how much a position must differ to be produced. A smaller total resolution pulls it down.
+const COS_DELTA: &str = "cos-delta";
+
 /// n and T.
 const SCALE: [&str; 2] = [STEPS_PER_TURN, TOTAL_RESOLUTION];
 
@@ -144,6 +147,16 @@ fn changes(goal: &Passport, before: &Passport) -> Vec<Change> {
         let to = Some(total.clone());
         let name = TOTAL_RESOLUTION.to_owned();
         changes.insert(at + 1, Change { name, from, to, clears_offset: true });
+    }
+    // On the way the total resolution may be as small as the steps per turn, which pulls a greater
+    // delta down for good.
+    let delta = goal.number(COS_DELTA).filter(|delta| Some(*delta) > goal.number(STEPS_PER_TURN));
+    if let (Some(_), Some(delta)) = (at, delta)
+        && changes.iter().all(|change| change.name != COS_DELTA)
+    {
+        let from = before.setting(COS_DELTA).cloned();
+        let to = Some(Reading::Number(delta));
+        changes.push(Change { name: COS_DELTA.to_owned(), from, to, clears_offset: false });
     }
     changes
 }

@@ -14,6 +14,8 @@ pub(super) const TOTAL_RESOLUTION: &str = "total-resolution";
 pub(super) const STEPS_PER_TURN: &str = "steps-per-turn";
 /// The configuration that Chk_Cfg had.
 const CONFIGURATION: &str = "configuration";
+/// What people write, and is no setting in a passport: it has places of its own there.
+pub(super) const NO_SETTINGS: [&str; 3] = [PRESET, OFFSET, CONFIGURATION];
 /// The steps of the disc in a turn.
 const SINGLETURN_RESOLUTION: &str = "singleturn-resolution";
 /// The turns that can be told apart, as a device tells them: 65535 for 65536, 0 for 1.
@@ -116,7 +118,7 @@ fn settings(values: &[Value]) -> Vec<Setting> {
     let mut settings: Vec<Setting> = Vec::new();
     for value in values.iter().filter(|value| value.setting) {
         let is_known = settings.iter().any(|known| known.name == value.name);
-        if is_known || [PRESET, OFFSET, CONFIGURATION].contains(&value.name.as_str()) {
+        if is_known || NO_SETTINGS.contains(&value.name.as_str()) {
             continue;
         }
         let reading = value.reading.clone();

@@ -43,6 +43,18 @@ fn a_total_that_the_steps_would_take_along_is_written_again() {
 }
 
 #[test]
+fn a_delta_that_a_smaller_total_on_the_way_would_pull_down_is_written_again() {
+    let few_turns = [("total-resolution", 8_192), ("cos-delta", 5_000)];
+    let goal = [("steps-per-turn", 1_000), ("total-resolution", 65_536_000), ("cos-delta", 5_000)];
+    let passport = toy::new("amg11-d29", 1, 0).with(&goal).preset_at(5).take();
+    // One turn of 1000 steps stands between.
+    let mut new = toy::new("amg11-d29", 2, 900).with(&few_turns);
+    let report = new.apply(&passport, None);
+    assert_eq!(report.verdict, Verdict::Done, "{report}");
+    assert_eq!(new.take().setting("cos-delta"), Some(&Reading::Number(5_000)));
+}
+
+#[test]
 fn on_profibus_no_parameterization_on_the_way_is_refused() {
     let scales = [(8_192, 1 << 29), (3_600, 921_600), (100, 6_553_600), (1, 1)];
     for (steps, total) in scales {

@@ -1,6 +1,6 @@
 //! What cannot give the same positions is refused before anything is written.
 
-use codewheel_commission::passport::Verdict;
+use codewheel_commission::passport::{Passport, Verdict};
 use codewheel_commission::{Kind, Trouble};
 
 use crate::toy::{self, Toy};
@@ -138,4 +138,41 @@ fn without_class_2_no_replacement_gets_a_preset() {
     // Mounted at the same code it gives the same positions.
     let mut new = toy::new("amg11-p29", 2, 50).with(&[("class-2", 0)]);
     assert!(new.plan(&passport, None).unwrap().is_empty());
+}
+
+#[test]
+fn what_a_person_wrote_and_no_passport_says_is_refused_before_anything_is_written() {
+    let text = toy::new("amg11-d29", 1, 0).preset_at(5).take().to_toml();
+    for (was, is, kind) in [
+        ("[settings]", "[settings]\npreset = 7", Kind::Usage),
+        ("[settings]", "[settings]\noffset = 7", Kind::Usage),
+        ("[settings]", "[settings]\nposition = 7", Kind::Usage),
+        ("steps-per-turn = 8192", "steps-per-turn = \"8192\"", Kind::Usage),
+        ("cos-delta = 1", "cos-delta = [1, 0, 0, 0]", Kind::Usage),
+        ("steps-per-turn = 8192", "steps-per-turn = 0", Kind::Refused),
+        ("steps-per-turn = 8192", "steps-per-turn = -9223372036854775808", Kind::Refused),
+        ("total-resolution = 536870912", "total-resolution = -1", Kind::Refused),
+        ("total-resolution = 536870912", "total-resolution = 9223372036854775807", Kind::Refused),
+        ("cos-delta = 1", "cos-delta = -1", Kind::Refused),
+    ] {
+        assert!(text.contains(was), "{was} in {text}");
+        let passport = Passport::parse(&text.replacen(was, is, 1)).expect("a passport");
+        let mut new = toy::new("amg11-d29", 1, 900);
+        let plan = new.plan(&passport, None);
+        let trouble = refused(&mut new, plan);
+        assert_eq!(trouble.kind, kind, "{is}: {trouble}");
+        assert!(!trouble.remedy.contains('-'), "{is}: {trouble}");
+    }
+}
+
+#[test]
+fn an_offset_beyond_all_bounds_is_taken_on_the_ring() {
+    let text = toy::new("amg11-d29", 1, 0).take().to_toml();
+    for offset in [i64::MAX, i64::MIN] {
+        let text = text.replacen("offset = 0", &format!("offset = {offset}"), 1);
+        let passport = Passport::parse(&text).expect("a passport");
+        let mut new = toy::new("amg11-d29", 1, 900);
+        assert_eq!(new.apply(&passport, None).verdict, Verdict::Done);
+        assert_eq!(i64::from(new.offset()).rem_euclid(1 << 29), offset.rem_euclid(1 << 29));
+    }
 }

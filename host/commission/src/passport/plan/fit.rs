@@ -3,9 +3,9 @@
 use codewheel_device::product::Bus;
 use codewheel_device::profibus::parameters;
 
-use super::super::take::{STEPS_PER_TURN, TOTAL_RESOLUTION, find};
+use super::super::take::{self, STEPS_PER_TURN, TOTAL_RESOLUTION, find};
 use super::super::{Passport, Subject, compare};
-use crate::{Kind, Session, Trouble, Value};
+use crate::{Kind, Reading, Session, Trouble, Value};
 
 pub(super) fn tried(session: &dyn Session) -> String {
     format!("apply the passport to the encoder at address {}", session.address())
@@ -13,6 +13,11 @@ pub(super) fn tried(session: &dyn Session) -> String {
 
 pub(super) fn refused(session: &dyn Session, came: String, remedy: String) -> Trouble {
     Trouble::new(Kind::Refused, tried(session), came, remedy)
+}
+
+/// The passport says what no passport can.
+fn wrong(session: &dyn Session, came: String, remedy: &str) -> Trouble {
+    Trouble::new(Kind::Usage, tried(session), came, remedy)
 }
 
 /// Refuses what cannot be, and warns of what may matter.
@@ -23,12 +28,35 @@ pub(super) fn check(
     session: &dyn Session,
     warnings: &mut Vec<String>,
 ) -> Result<(), Trouble> {
+    for name in [STEPS_PER_TURN, TOTAL_RESOLUTION] {
+        if let Some(wanted) = goal.number(name).filter(|wanted| *wanted < 1) {
+            let came = format!("{name} cannot be {wanted}");
+            return Err(refused(session, came, "it takes 1 or more".to_owned()));
+        }
+    }
     disc(goal, before, session)?;
     for setting in &goal.settings {
         let name = &setting.name;
-        let Some(value) = find(values, name) else {
+        let value = find(values, name);
+        if take::NO_SETTINGS.contains(&name.as_str()) || value.is_some_and(|value| !value.setting) {
+            return Err(wrong(
+                session,
+                format!("{name} is no setting that a passport carries"),
+                "take the line out of [settings]; where the machine stands belongs into [position]",
+            ));
+        }
+        let is_parameter = goal.bus == Bus::Profibus && parameters::Row::find(name).is_some();
+        let wants_number = match value {
+            Some(value) => matches!(value.reading, Reading::Number(_)),
+            None => is_parameter,
+        };
+        if wants_number && !matches!(setting.reading, Reading::Number(_)) {
+            let came = format!("{name} is a number, and the passport says otherwise");
+            return Err(wrong(session, came, "write the number there, without quotes"));
+        }
+        let Some(value) = value else {
             // In class 1 they are there all the same, and cannot be read.
-            if goal.bus == Bus::Profibus && parameters::Row::find(name).is_some() {
+            if is_parameter {
                 continue;
             }
             return Err(refused(
@@ -125,9 +153,7 @@ fn range(
     let Some(wanted) = goal.number(name) else { return Ok(()) };
     let disc_known = before.nameplate.singleturn_resolution.is_some();
     let range = match name {
-        STEPS_PER_TURN | TOTAL_RESOLUTION if disc_known => {
-            (wanted < 1).then_some((1, i64::from(u32::MAX)))
-        }
+        STEPS_PER_TURN | TOTAL_RESOLUTION if disc_known => None,
         "cos-delta" => {
             let total = goal.total_in_force().or_else(|| before.total_in_force());
             total.map(|total| (1, i64::from(total)))
