@@ -161,7 +161,7 @@ impl<B: FieldBus> Crew<B> {
         medium: &mut impl Medium<B>,
     ) -> Result<(Begun, Option<(usize, u8)>), Refusal> {
         let done = match command {
-            Command::TurnBy(steps) => self.turn(now, place, medium, |_, left| steps + left),
+            Command::TurnBy(steps) => self.turn(now, place, medium, |_, left| steps.saturating_add(left)),
             Command::TurnTo(code) => self.turn_to(now, place, *code, medium),
             Command::Motion(text) => self.set_motion(now, place, text, medium),
             Command::Stop => self.hold(now, place, medium),

@@ -103,8 +103,12 @@ fn turns_in_a_row_add_up_and_to_a_code_the_shaft_goes_the_shorter_way() {
     let refusal = order(&mut bus, &mut moment, &Command::TurnTo(last + 1)).unwrap_err();
     assert_eq!(refusal.cause, Cause::Value);
     assert!(refusal.text.contains(&format!("0 to {last}")), "{refusal}");
-    let refusal = order(&mut bus, &mut moment, &Command::TurnBy(i64::MIN)).unwrap_err();
-    assert!(refusal.text.contains("65536 turns at most"), "{refusal}");
+    for (far, way) in [(1_000_000, i64::MAX), (-1_000_000, i64::MIN)] {
+        order(&mut bus, &mut moment, &Command::TurnBy(far)).unwrap();
+        // What is left of the turn before adds to it.
+        let refusal = order(&mut bus, &mut moment, &Command::TurnBy(way)).unwrap_err();
+        assert!(refusal.text.contains("65536 turns at most"), "{refusal}");
+    }
 }
 
 #[test]
