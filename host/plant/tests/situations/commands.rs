@@ -272,7 +272,11 @@ fn somebody_who_switches_off_is_not_overruled_by_the_plan() {
     assert!(!power(&mut bus, 3_100));
     moment = 3_100;
     order(&mut bus, &mut moment, &Command::Power(true)).unwrap();
-    assert!(power(&mut bus, 3_101) && power(&mut bus, 6_000));
+    assert!(power(&mut bus, 3_101));
+    let later = at(&mut bus, 6_000);
+    assert!(device(&later, "drive").state.power);
+    let told = told(&later, "drive");
+    assert!(!told.iter().any(|text| text.contains("fault over")), "it was over before: {told:?}");
 }
 
 #[test]
@@ -542,4 +546,19 @@ fn a_master_finds_a_device_at_the_address_that_it_was_moved_to() {
     let drive = device(&snapshot, "drive");
     assert_eq!((drive.address, drive.state.connection, drive.state.master), (9, "polled", Some(0)));
     assert_eq!(drive.served_by.as_deref(), Some("scanner at 0"));
+}
+
+#[test]
+fn the_identity_tells_its_revision_and_status_while_there_is_power() {
+    let mut bus = devicenet("");
+    let mut moment = 3_000;
+    at(&mut bus, moment);
+    assert_eq!(object(&bus, "revision").value, Some(Value::Text("1.1".into())));
+    assert_eq!(number(&bus, "status"), 0b001, "owned");
+    order(&mut bus, &mut moment, &write("cos-delta", 5)).unwrap();
+    order(&mut bus, &mut moment, &Command::Save).unwrap();
+    assert_eq!(number(&bus, "status"), 0b101, "owned and configured");
+    order(&mut bus, &mut moment, &Command::Power(false)).unwrap();
+    assert_eq!(object(&bus, "status").value, None);
+    assert_eq!(number(&bus, "vendor"), 468);
 }
