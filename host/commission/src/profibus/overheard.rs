@@ -12,6 +12,10 @@ use super::settings::HIGHEST_ADDRESS;
 use super::telegram::Receiver;
 use super::{CycleTimes, Diagnosis, LONGEST_SLOT, StationKind};
 
+/// How many octets are enough to say that none makes a telegram: more than the end of one that began
+/// before it was listened to.
+const GIBBERISH: u64 = 16;
+
 /// Noise may look like a token once or twice; a master alone with its token sends nothing else.
 const CERTAIN_TOKENS: u64 = 3;
 
@@ -138,7 +142,7 @@ impl Overheard {
     /// rate, or its two lines are crossed.
     #[must_use]
     pub fn is_gibberish(&self) -> bool {
-        self.octets > 0 && self.telegrams == 0 && self.masters().next().is_none()
+        self.octets >= GIBBERISH && self.telegrams == 0 && self.masters().next().is_none()
     }
 
     /// Octets heard, the broken ones among them.

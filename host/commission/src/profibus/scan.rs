@@ -89,6 +89,9 @@ pub fn scan(
     Ok(Survey { bus: Bus::Profibus, nodes, remarks })
 }
 
+/// How often in a scan a slave that has just answered is asked for its diagnosis again.
+const AGAIN: u32 = 32;
+
 /// What a station said when it was asked.
 #[derive(Clone, Debug)]
 struct Said {
@@ -115,15 +118,22 @@ fn ask_all<S: Seat<Station = Console>>(
             open += u64::from(master.ask(address, Acyclic::FdlStatus).is_ok());
         }
     }
-    let mut done = 0;
+    let (mut done, mut again) = (0, AGAIN);
     let mut all: BTreeMap<u8, Said> = BTreeMap::new();
     while done < open {
         let until = conversation.patience();
         let answer = |console: &mut Console, _| console.master_mut()?.take_answer();
         let Some(answered) = conversation.wait(until, answer)? else { break };
         done += 1;
-        let Answered { address, answer, .. } = answered;
+        let Answered { address, request, answer } = answered;
         match answer {
+            // It was there a moment ago: on a PC that is busy an answer may come after its slot.
+            Answer::Silence if request == Acyclic::Diagnosis && again > 0 => {
+                again -= 1;
+                if let Some(master) = conversation.console().master_mut() {
+                    open += u64::from(master.ask(address, request).is_ok());
+                }
+            }
             Answer::Station(kind) => {
                 all.insert(address, Said { kind, diagnosis: None });
                 if kind == StationKind::Slave
