@@ -4,8 +4,9 @@ use codewheel_plant::{AnyBusPlan, FieldBus, Plant, SlaveState, VirtualBus};
 
 use super::{at, device, example, only_bus, plant};
 
-const EXAMPLES: [&str; 6] = [
+const EXAMPLES: [&str; 7] = [
     "demo.toml",
+    "bench.toml",
     "commissioning.toml",
     "faults.toml",
     "hundred.toml",
