@@ -353,6 +353,7 @@ fn no_parameter(tried: &str, key: &str) -> Trouble {
 fn told(reading: &Reading) -> String {
     match reading {
         Reading::Number(number) => number.to_string(),
+        Reading::Real(real) => real.to_string(),
         Reading::Text(text) => text.clone(),
         Reading::Octets(octets) => {
             octets.iter().map(|octet| format!("{octet:02X}")).collect::<Vec<_>>().join(" ")

@@ -17,7 +17,7 @@ use codewheel_station::can::{BitRate, Filter, Frame, Identifier};
 use codewheel_station::{Duration, Instant};
 
 use crate::liar::Liar;
-use crate::toy::Toy;
+use crate::toy::{Drive, Toy};
 
 pub(crate) type Device = DeviceNetEncoder<Shaft>;
 pub(crate) type Node = Either<Console, Either<Device, Either<Scanner, Either<Toy, Liar>>>>;
@@ -116,6 +116,12 @@ impl WireSeat {
         let filter = [toy.server.filter()];
         let node = Either::Right(Either::Right(Either::Right(Either::Left(toy))));
         self.wire.attach("toy", node, &filter, false)
+    }
+
+    pub(crate) fn drive(&mut self, id: NodeId) -> &Drive {
+        let node = self.wire.node_mut(id).and_then(Either::right_mut);
+        let node = node.and_then(Either::right_mut).and_then(Either::right_mut);
+        &node.and_then(Either::left_mut).expect("a toy that was not detached").drive
     }
 
     pub(crate) fn liar(&mut self, liar: Liar) {
