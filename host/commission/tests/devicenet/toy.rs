@@ -308,7 +308,9 @@ impl Station for Toy {
         self.server.advance(now, &mut self.drive);
     }
     fn transmit(&mut self, now: Instant) -> Option<Frame> {
-        if let Some((_, frame)) = self.late.pop_front_if(|(at, _)| *at <= now) {
+        if self.late.front().is_some_and(|(at, _)| *at <= now)
+            && let Some((_, frame)) = self.late.pop_front()
+        {
             return Some(frame);
         }
         let frame = self.server.transmit(now, &mut self.drive)?;
