@@ -279,44 +279,47 @@ impl<'de> DeserializeSeed<'de> for Entry {
     type Value = Reading;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Reading, D::Error> {
-        impl<'de> Visitor<'de> for Entry {
-            type Value = Reading;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, a text or octets such as [0x20, 0x04]")
-            }
-
-            fn visit_i64<E>(self, number: i64) -> Result<Reading, E> {
-                Ok(Reading::Number(number))
-            }
-
-            fn visit_u64<E: serde::de::Error>(self, number: u64) -> Result<Reading, E> {
-                let number = i64::try_from(number).map_err(|_| E::custom("a number too large"))?;
-                self.visit_i64(number)
-            }
-
-            fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Reading, E> {
-                if !self.takes_fractions {
-                    return Err(E::invalid_type(Unexpected::Float(number), &self));
-                }
-                Ok(Reading::Real(Real::Double(number)))
-            }
-
-            fn visit_str<E>(self, text: &str) -> Result<Reading, E> {
-                Ok(Reading::Text(text.to_owned()))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Reading, A::Error> {
-                let mut octets = Vec::new();
-                while let Some(octet) = seq.next_element::<i64>()? {
-                    octets.push(u8::try_from(octet).map_err(|_| {
-                        A::Error::custom(format!("{octet} is no octet: it has 0 to 255"))
-                    })?);
-                }
-                Ok(Reading::Octets(octets))
-            }
-        }
         deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Entry {
+    type Value = Reading;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a text or octets such as [0x20, 0x04]")
+    }
+
+    fn visit_i64<E>(self, number: i64) -> Result<Reading, E> {
+        Ok(Reading::Number(number))
+    }
+
+    fn visit_u64<E: serde::de::Error>(self, number: u64) -> Result<Reading, E> {
+        let number = i64::try_from(number).map_err(|_| E::custom("a number too large"))?;
+        self.visit_i64(number)
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Reading, E> {
+        if !self.takes_fractions {
+            return Err(E::invalid_type(Unexpected::Float(number), &self));
+        }
+        Ok(Reading::Real(Real::Double(number)))
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Reading, E> {
+        Ok(Reading::Text(text.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Reading, A::Error> {
+        let mut octets = Vec::new();
+        while let Some(octet) = seq.next_element::<i64>()? {
+            octets.push(
+                u8::try_from(octet).map_err(|_| {
+                    A::Error::custom(format!("{octet} is no octet: it has 0 to 255"))
+                })?,
+            );
+        }
+        Ok(Reading::Octets(octets))
     }
 }
 
