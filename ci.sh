@@ -14,7 +14,7 @@ export PATH="$PATH:$HOME/.cargo/bin"
 CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 export CARGO_TARGET_DIR
 steps=(fmt clippy doc test requests segments telegrams no-std bench-builds fuzz-builds deny
-    book strangers socketcan)
+    book strangers page socketcan)
 
 explain() {
     case $1 in
@@ -31,6 +31,7 @@ explain() {
     deny) echo "licences, sources and bans of every dependency (cargo deny, deny.toml)" ;;
     book) echo "the user's book builds (mdbook, docs/book); its commands and links run in test" ;;
     strangers) echo "masters and parsers that are not ours, or know the manuals alone (strangers/)" ;;
+    page) echo "people before the page, in Chromium, by keyboard; axe judges it (strangers/page)" ;;
     socketcan) echo "can-utils, on a Linux kernel with emulated controllers, joins us (strangers/)" ;;
     esac
 }
@@ -101,17 +102,13 @@ step_strangers() {
     need tshark tshark
     need python3 python3 python3-venv
     local venv="$CARGO_TARGET_DIR/strangers-venv"
-    if ! cmp -s strangers/requirements.txt "$venv/requirements.txt"; then
-        rm -rf "$venv"
-        python3 -m venv "$venv" || { install_packages python3-venv && python3 -m venv "$venv"; }
-        "$venv/bin/pip" install --quiet --requirement strangers/requirements.txt
-        cp strangers/requirements.txt "$venv/requirements.txt"
-    fi
+    make_venv "$venv" strangers/requirements.txt
     cargo build --package codewheel --locked
     local python="$venv/bin/python" logs="$CARGO_TARGET_DIR/strangers-logs" walks=()
     mkdir -p "$logs"
     "$python" strangers/devicenet_master_test.py
     "$python" strangers/profibus_book_test.py
+    "$python" strangers/commission_test.py
     "$python" strangers/tshark_judges.py --self-test
     "$python" strangers/data_sheets.py --self-test host/datasheet/tests/golden
     "$python" strangers/data_sheets.py host/datasheet/tests/golden
@@ -133,6 +130,9 @@ step_strangers() {
     walk profibus-session profibus_session.py
     walk pyprofibus pyprofibus_session.py
     walk python-can-links python_can_links.py
+    end_walks
+    walk commission-devicenet commission_devicenet.py
+    walk commission-profibus commission_profibus.py
     end_walks
     # What failed comes last, where people look first.
     if [ ${#failed[@]} != 0 ]; then
@@ -159,6 +159,21 @@ end_walks() {
     pids=() walks=()
 }
 
+step_page() {
+    need python3 python3 python3-venv
+    need chromium chromium fonts-dejavu-core
+    local venv="$CARGO_TARGET_DIR/page-venv"
+    make_venv "$venv" strangers/page/requirements.txt
+    # Playwright brings the node that drives it.
+    local node
+    node=$("$venv/bin/python" -c \
+        'import pathlib, playwright; print(pathlib.Path(playwright.__file__).parent / "driver/node")')
+    "$node" --test strangers/page/*.test.mjs
+    cargo build --release --package codewheel --locked
+    "$venv/bin/python" strangers/page/page_walk.py "$CARGO_TARGET_DIR/release/codewheel" \
+        --log "$CARGO_TARGET_DIR/page.log"
+}
+
 # Installs what it needs by itself.
 step_socketcan() {
     cargo build --package codewheel --locked
@@ -173,6 +188,15 @@ walk() {
         >"$logs/$name.out" 2>&1 &
     walks+=("$name")
     pids+=($!)
+}
+
+# Makes the virtual environment $1 with what the file $2 asks for, unless it is there.
+make_venv() {
+    cmp -s "$2" "$1/requirements.txt" && return
+    rm -rf "$1"
+    python3 -m venv "$1" || { install_packages python3-venv && python3 -m venv "$1"; }
+    "$1/bin/pip" install --quiet --requirement "$2"
+    cp "$2" "$1/requirements.txt"
 }
 
 # Installs Debian packages $2… (or $1) where the command $1 is missing.

@@ -463,7 +463,7 @@ class Commission(Walk[Frame]):
 
     def hears_nobody_on_an_empty_bus(self) -> str:
         with self.segment():
-            outcome = self.verb("scan").ended(TIME_OUT)
+            outcome = self.verb("scan").ended(BUS)
         return f"after {outcome.seconds:.1f} s: {outcome.err.strip()}"
 
     def understands_wider_paths(self) -> str:

@@ -558,7 +558,7 @@ class Commission(Walk[bytes]):
 
     def hears_nobody_on_an_empty_line(self) -> str:
         with self.line():
-            outcome = self.verb("scan").ended(TIME_OUT)
+            outcome = self.verb("scan").ended(BUS)
         return f"after {outcome.seconds:.1f} s: {outcome.err.strip()}"
 
     # --- The run

@@ -1,6 +1,7 @@
 """What the walks and the screenshots share: the program with its page, and a browser before it.
 
-No script to run: `page_walk.py` and `screenshots.py` build on it.
+No script to run: `page_walk.py` and `screenshots.py` build on it. It lets them import what stands
+beside this folder.
 """
 
 from __future__ import annotations
@@ -8,15 +9,21 @@ from __future__ import annotations
 import contextlib
 import re
 import subprocess
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from steps import Wrong  # noqa: E402
 
 CHROMIUM = "/usr/bin/chromium"
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 READY_SECONDS = 20.0
+PATIENCE = 5.0
 
 WIDE = {"width": 1280, "height": 800}
 PHONE = {"width": 390, "height": 844}
@@ -102,16 +109,37 @@ def opened(
 ) -> Page:
     """A page that shows a view and is live; what the console complains of goes to `complaints`."""
     size = size or WIDE
-    context = browser.new_context(
-        viewport=size, color_scheme=scheme, has_touch=size["width"] < 500
-    )
+    context = browser.new_context(viewport=size, color_scheme=scheme, has_touch=size["width"] < 500)
     page = context.new_page()
     heard = complaints if complaints is not None else []
     page.on("pageerror", lambda error: heard.append(str(error)))
     page.on(
         "console",
-        lambda message: heard.append(message.text) if message.type in ("error", "warning") else None,
+        lambda message: (
+            heard.append(message.text) if message.type in ("error", "warning") else None
+        ),
     )
     page.goto(f"{address}/{route}")
     page.wait_for_selector("html[data-link=live]")
     return page
+
+
+def number(locator: Locator) -> int | None:
+    """A whole number as the page writes it; None where it shows that there is none."""
+    text = re.sub(r"[\s\u202f]", "", locator.inner_text()).replace("\u2212", "-")
+    return int(text) if re.fullmatch(r"-?\d+", text) else None
+
+
+def until(
+    what: str, seen: Callable[[], object], wanted: object, seconds: float = PATIENCE
+) -> object:
+    """Waits until `seen` is `wanted`, or until it is true of it where that can be called."""
+    end = time.monotonic() + seconds
+    while True:
+        now = seen()
+        if wanted(now) if callable(wanted) else now == wanted:
+            return now
+        if time.monotonic() > end:
+            asked = "what was wanted did not come" if callable(wanted) else f"expected {wanted!r}"
+            raise Wrong(f"{what}: {asked} within {seconds:g} s, got {now!r}")
+        time.sleep(0.03)

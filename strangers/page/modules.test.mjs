@@ -50,9 +50,18 @@ test("a time has hours only where there are some", () => {
 });
 
 test("a merge patch changes what it names, and null takes away", () => {
-  const state = { at: 1, buses: { line: { load: 0.5, devices: { drive: { faults: ["stuck"], alarm: true } } } } };
-  mergePatch(state, { at: 2, buses: { line: { load: null, devices: { drive: { faults: [], alarm: false } } } } });
-  assert.deepEqual(state, { at: 2, buses: { line: { devices: { drive: { faults: [], alarm: false } } } } });
+  const state = {
+    at: 1,
+    buses: { line: { load: 0.5, devices: { drive: { faults: ["stuck"], alarm: true } } } },
+  };
+  mergePatch(state, {
+    at: 2,
+    buses: { line: { load: null, devices: { drive: { faults: [], alarm: false } } } },
+  });
+  assert.deepEqual(state, {
+    at: 2,
+    buses: { line: { devices: { drive: { faults: [], alarm: false } } } },
+  });
   mergePatch(state, { buses: { field: { load: 0.1 } } });
   assert.equal(state.buses.field.load, 0.1);
 });
@@ -84,10 +93,19 @@ test("the mark of position 0 stands still while the shaft turns, whatever the di
   const at = (code, direction) => {
     const unwrapped = direction === "CW" ? code : -code;
     const position = (((unwrapped + 2048) % 8192) + 8192) % 8192;
-    return angles({
-      power: true, code, direction, offset: 2048, steps_per_turn: 8192, total_resolution: 8192,
-      angle: position / 8192, rpm: 60,
-    }, { steps: 8192 });
+    return angles(
+      {
+        power: true,
+        code,
+        direction,
+        offset: 2048,
+        steps_per_turn: 8192,
+        total_resolution: 8192,
+        angle: position / 8192,
+        rpm: 60,
+      },
+      { steps: 8192 },
+    );
   };
   for (const direction of ["CW", "CCW"]) {
     const zero = direction === "CW" ? 0.75 : 0.25;
@@ -111,11 +129,18 @@ test("an address names an encoder, whatever is in its name", () => {
   const plant = { buses: [{ id: "a/b", devices: [{ id: "ü 1" }] }] };
   const found = encoderAt(plant, linkTo({ bus: "a/b", device: "ü 1" }));
   assert.deepEqual(found.place, { bus: "a/b", device: "ü 1" });
-  for (const hash of ["", "#/", "#/a%2Fb", "#/a%2Fb/none", "#/%/x"]) assert.equal(encoderAt(plant, hash), null);
+  for (const hash of ["", "#/", "#/a%2Fb", "#/a%2Fb/none", "#/%/x"])
+    assert.equal(encoderAt(plant, hash), null);
 });
 
 test("a filter takes words, and leaves out those behind a minus", () => {
-  const line = { from: "5", to: null, name: "poll response", text: "position 4096", octets: "00 10" };
+  const line = {
+    from: "5",
+    to: null,
+    name: "poll response",
+    text: "position 4096",
+    octets: "00 10",
+  };
   assert.ok(matches(line, ["poll", "4096"]));
   assert.ok(!matches(line, ["poll", "-response"]));
   assert.ok(matches(line, []));

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the pictures of the page in docs/images, light and dark, from what the program really shows.
+"""Makes the pictures of the page in docs/images, light and dark, from what it really shows.
 
 Usage: screenshots.py [PROGRAM] [--seconds S]
 
@@ -18,16 +18,12 @@ import tempfile
 import time
 from pathlib import Path
 
+from browser import Served, chromium, opened
 from PIL import Image
 from playwright.sync_api import Page
+from steps import default_program
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
-
-from browser import Served, chromium, opened  # noqa: E402
-from steps import default_program  # noqa: E402
-
-ROOT = HERE.parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"
 STEPS = 8192
 SIZE = {"width": 1280, "height": 800}

@@ -67,7 +67,8 @@ impl<'a> Encoder<'a> {
 
     /// Ends the session, whatever became of `result`.
     pub(super) fn end<T>(mut self, result: Result<T, Failure>) -> Result<T, Failure> {
-        let interrupted = self.stop.take();
+        let interrupted = self.stop.was_asked();
+        self.stop.take();
         let released = self.session.release();
         for notice in self.session.take_notices() {
             self.say(&notice);

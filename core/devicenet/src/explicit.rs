@@ -53,6 +53,45 @@ impl Header {
     }
 }
 
+/// How class and instance lie in requests over an explicit connection, as the slave says when it
+/// opens it (CIP volume 3, chapter 4). The unconnected port is always 8/8.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum BodyFormat {
+    /// 0: both in one octet.
+    #[default]
+    Class8Instance8,
+    /// 1: the instance in two octets.
+    Class8Instance16,
+    /// 2: both in two octets.
+    Class16Instance16,
+    /// 3: the class in two octets.
+    Class16Instance8,
+}
+
+impl BodyFormat {
+    /// The format with this number; `None` for one that is none of these, such as paths (4).
+    #[must_use]
+    pub const fn from_octet(octet: u8) -> Option<Self> {
+        Some(match octet {
+            0 => Self::Class8Instance8,
+            1 => Self::Class8Instance16,
+            2 => Self::Class16Instance16,
+            3 => Self::Class16Instance8,
+            _ => return None,
+        })
+    }
+
+    /// Whether a class, and whether an instance, has a high octet.
+    pub(crate) const fn high_octets(self) -> (bool, bool) {
+        match self {
+            Self::Class8Instance8 => (false, false),
+            Self::Class8Instance16 => (false, true),
+            Self::Class16Instance16 => (true, true),
+            Self::Class16Instance8 => (true, false),
+        }
+    }
+}
+
 /// A service code, 00 … 7F in requests. Unknown codes survive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Service(pub u8);
@@ -124,25 +163,52 @@ impl GeneralStatus {
     /// 20: invalid parameter.
     pub const INVALID_PARAMETER: Self = Self(0x20);
 
-    /// The standard's words for the code.
+    /// The standard's words for the code (CIP volume 1, appendix B); D0 … FF belong to the classes.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::RESOURCE_UNAVAILABLE => "resource unavailable",
-            Self::PATH_UNKNOWN => "path destination unknown",
-            Self::SERVICE_NOT_SUPPORTED => "service not supported",
-            Self::INVALID_ATTRIBUTE_VALUE => "invalid attribute value",
-            Self::ALREADY_IN_STATE => "already in the requested state",
-            Self::OBJECT_STATE_CONFLICT => "object state conflict",
-            Self::ATTRIBUTE_NOT_SETTABLE => "attribute not settable",
-            Self::DEVICE_STATE_CONFLICT => "device state conflict",
-            Self::NOT_ENOUGH_DATA => "not enough data",
-            Self::ATTRIBUTE_NOT_SUPPORTED => "attribute not supported",
-            Self::TOO_MUCH_DATA => "too much data",
-            Self::OBJECT_DOES_NOT_EXIST => "object does not exist",
-            Self::NO_STORED_DATA => "no stored attribute data",
-            Self::STORE_FAILED => "store operation failed",
-            Self::INVALID_PARAMETER => "invalid parameter",
+        match self.0 {
+            0x00 => "success",
+            0x01 => "connection failure",
+            0x02 => "resource unavailable",
+            0x03 => "invalid parameter value",
+            0x04 => "path segment error",
+            0x05 => "path destination unknown",
+            0x06 => "partial transfer",
+            0x07 => "connection lost",
+            0x08 => "service not supported",
+            0x09 => "invalid attribute value",
+            0x0A => "attribute list error",
+            0x0B => "already in the requested state",
+            0x0C => "object state conflict",
+            0x0D => "object already exists",
+            0x0E => "attribute not settable",
+            0x0F => "privilege violation",
+            0x10 => "device state conflict",
+            0x11 => "reply data too large",
+            0x12 => "fragmentation of a primitive value",
+            0x13 => "not enough data",
+            0x14 => "attribute not supported",
+            0x15 => "too much data",
+            0x16 => "object does not exist",
+            0x17 => "service fragmentation sequence not in progress",
+            0x18 => "no stored attribute data",
+            0x19 => "store operation failed",
+            0x1A => "routing failure, request packet too large",
+            0x1B => "routing failure, response packet too large",
+            0x1C => "missing attribute list entry data",
+            0x1D => "invalid attribute value list",
+            0x1E => "embedded service error",
+            0x1F => "vendor specific error",
+            0x20 => "invalid parameter",
+            0x21 => "write-once value or medium already written",
+            0x22 => "invalid reply received",
+            0x25 => "key failure in path",
+            0x26 => "path size invalid",
+            0x27 => "unexpected attribute in list",
+            0x28 => "invalid member ID",
+            0x29 => "member not settable",
+            0x2A => "group 2 only server general failure",
+            0xD0.. => "error of the object class",
             _ => "unknown status",
         }
     }
@@ -248,5 +314,10 @@ mod tests {
         assert_eq!(plain.to_string(), "0E attribute not settable");
         let owned = Error::with(GeneralStatus::OBJECT_STATE_CONFLICT, 1);
         assert_eq!(owned.to_string(), "0C object state conflict (additional code 01)");
+        for (status, words) in
+            [(0x0F, "0F privilege violation"), (0x1F, "1F vendor specific error")]
+        {
+            assert_eq!(Error::from(GeneralStatus(status)).to_string(), words);
+        }
     }
 }

@@ -24,6 +24,11 @@ pub trait Seat {
     /// # Errors
     /// [`LinkError`] when the port is lost for good.
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError>;
+
+    /// Lets turns go on that failed because a person wanted an end: what was begun on the bus is now
+    /// undone, which takes a few more. Called where something is given up, whatever the reason. There
+    /// is nothing to do for a seat whose turns fail for the port alone.
+    fn wind_up(&mut self) {}
 }
 
 /// A seat that is lent.
@@ -40,6 +45,10 @@ impl<S: Seat + ?Sized> Seat for &mut S {
 
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
         S::turn(self, until)
+    }
+
+    fn wind_up(&mut self) {
+        S::wind_up(self);
     }
 }
 

@@ -14,6 +14,8 @@ import { clock } from "./units.js";
 const [FAST, CALM] = [20, 10];
 const MANY = 24;
 const RETRY = 2000;
+/** How long a page may be hidden before it lets go of its stream, in ms. */
+const HIDDEN = 60_000;
 
 const byId = (id) => document.getElementById(id);
 const main = byId("main");
@@ -62,7 +64,9 @@ function show(plant) {
       view.root.remove();
     }
     overview.root.hidden = found !== null;
-    view = found ? createEncoder({ plant, ...found, live, history: histories.of(found.place) }) : overview;
+    view = found
+      ? createEncoder({ plant, ...found, live, history: histories.of(found.place) })
+      : overview;
     if (found) main.append(view.root);
     document.title = `${view.title} – Codewheel`;
     live.want({
@@ -83,6 +87,7 @@ function show(plant) {
     if (live.link === "live") reloadIfAnother(plant);
     showLink(live);
   });
+  sleepWhileHidden(live);
   addEventListener("hashchange", route);
   route();
 
@@ -93,6 +98,19 @@ function show(plant) {
     requestAnimationFrame(picture);
   };
   requestAnimationFrame(picture);
+}
+
+/**
+ * A browser has six connections for a plant, so pages that nobody looks at must not hold them all.
+ * For a while they do, since who comes back wants to see the last minute.
+ */
+function sleepWhileHidden(live) {
+  let timer = null;
+  document.addEventListener("visibilitychange", () => {
+    clearTimeout(timer);
+    if (document.hidden) timer = setTimeout(() => live.sleep(), HIDDEN);
+    else live.wake();
+  });
 }
 
 /** What answers again after a while may be another plant, or the same one with other devices. */

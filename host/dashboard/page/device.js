@@ -22,10 +22,13 @@ export function createDevicePanel(context) {
   let on = false;
 
   const power = button("Power", () => outcome.of(send("PUT", "power", { on: !on })), {
-    class: "power large", disabled: Boolean(locked), "aria-pressed": "false",
+    class: "power large",
+    disabled: Boolean(locked),
+    "aria-pressed": "false",
   });
   const cycle = button("Off and on", () => outcome.of(switchOffAndOn()), {
-    disabled: Boolean(locked), title: "Switches the power off and on again",
+    disabled: Boolean(locked),
+    title: "Switches the power off and on again",
   });
   async function switchOffAndOn() {
     if (on) await send("PUT", "power", { on: false });
@@ -36,9 +39,13 @@ export function createDevicePanel(context) {
   const switches = createSwitches(context);
   const { root, body } = panel("Device", "device");
   body.append(
-    element("div", { class: "front" },
-      element("div", { class: "lamp-large" }, lamp.root), health,
-      element("div", { class: "power-row" }, power, cycle)),
+    element(
+      "div",
+      { class: "front" },
+      element("div", { class: "lamp-large" }, lamp.root),
+      health,
+      element("div", { class: "power-row" }, power, cycle),
+    ),
     outcome.root,
     element("dl", { class: "readings" }, address.root, state.root, master.root, serial.root),
     switches.root,
@@ -51,11 +58,15 @@ export function createDevicePanel(context) {
       lamp.update(now?.lamp);
       setAttribute(power, "aria-pressed", String(on));
       setText(power, on ? "Power is on" : "Power is off");
-      setText(state.value, on ? now.state ?? NOTHING : "no power");
-      setText(master.value, on ? now.network?.master ?? "none" : NOTHING);
+      setText(state.value, on ? (now.state ?? NOTHING) : "no power");
+      setText(master.value, on ? (now.network?.master ?? "none") : NOTHING);
       setText(address.value, now?.address ?? NOTHING);
       setText(health, healthOf(now, on));
-      setAttribute(health, "data-standing", on && now.alarm ? "alarm" : on && now.warning ? "warning" : null);
+      setAttribute(
+        health,
+        "data-standing",
+        on && now.alarm ? "alarm" : on && now.warning ? "warning" : null,
+      );
       switches.update(now?.switches, on);
     },
   };

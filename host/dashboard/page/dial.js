@@ -37,14 +37,22 @@ export function angles(device, { steps }) {
 
 /** A small dial for the overview: needle, marks and where position 0 lies. */
 export function createSmallDial() {
-  const needle = svg("g", { class: "needle" }, svg("path", { d: "M-3.4 0 L-0.8-40 L0.8-40 L3.4 0 L2 15 L-2 15Z" }));
+  const needle = svg(
+    "g",
+    { class: "needle" },
+    svg("path", { d: "M-3.4 0 L-0.8-40 L0.8-40 L3.4 0 L2 15 L-2 15Z" }),
+  );
   const zero = svg("path", { class: "zero", d: "M-5-47 L5-47 L0-39Z" });
   const face = svg("circle", { class: "face", r: 46 });
   const marks = svg("path", { class: "marks", d: ticks(12, 41, 45) });
   const root = svg(
     "svg",
     { class: "dial small", viewBox: "-50 -50 100 100", "aria-hidden": "true" },
-    face, marks, zero, needle, svg("circle", { class: "hub", r: 6 }),
+    face,
+    marks,
+    zero,
+    needle,
+    svg("circle", { class: "hub", r: 6 }),
   );
   return {
     root,
@@ -67,15 +75,21 @@ export function createLargeDial(shaft) {
   const disc = svg("g", { class: "disc" }, ...tracks(), ...shaftEnd(shaft));
   const fan = svg("path", { class: "fan" });
   const needle = svg(
-    "g", { class: "needle" }, fan,
+    "g",
+    { class: "needle" },
+    fan,
     svg("path", { d: "M-2.2-30 L-1.4-97 L0-101 L1.4-97 L2.2-30Z" }),
   );
   const zero = svg(
-    "g", { class: "zero" },
+    "g",
+    { class: "zero" },
     svg("path", { d: "M-6-118 L6-118 L0-107Z" }),
     svg("text", { y: -124.5 }, "0"),
   );
-  const arrow = svg("path", { class: "arrow", d: "M-21-12 A24 24 0 0 1 21-12 M21-12 l-8-1.6 M21-12 l1.6-8" });
+  const arrow = svg("path", {
+    class: "arrow",
+    d: "M-21-12 A24 24 0 0 1 21-12 M21-12 l-8-1.6 M21-12 l1.6-8",
+  });
   const root = svg(
     "svg",
     { class: "dial large", viewBox: "-131 -131 262 262", "aria-hidden": "true" },
@@ -84,7 +98,10 @@ export function createLargeDial(shaft) {
     svg("path", { class: "marks fine", d: ticks(180, 101, 104) }),
     svg("path", { class: "marks", d: ticks(36, 98, 104) }),
     svg("path", { class: "marks strong", d: ticks(12, 95, 104) }),
-    ...labels(), disc, needle, zero,
+    ...labels(),
+    disc,
+    needle,
+    zero,
     svg("g", { class: "arrow-seat" }, arrow),
   );
   let last = { shaft: null, zero: null, speed: 0 };
@@ -99,14 +116,20 @@ export function createLargeDial(shaft) {
       last = next;
       setAttribute(root, "data-off", next.zero === null);
       setAttribute(root, "data-direction", device?.direction ?? "CW");
-      if (next.zero !== null) setAttribute(zero, "transform", `rotate(${(next.zero * 360).toFixed(2)})`);
+      if (next.zero !== null)
+        setAttribute(zero, "transform", `rotate(${(next.zero * 360).toFixed(2)})`);
       const blur = Math.abs(next.speed) > BLUR_RPM;
-      setAttribute(fan, "d", blur ? sector(Math.sign(next.speed), Math.min(Math.abs(next.speed) / 1500, 0.9)) : null);
+      setAttribute(
+        fan,
+        "d",
+        blur ? sector(Math.sign(next.speed), Math.min(Math.abs(next.speed) / 1500, 0.9)) : null,
+      );
     },
     /** Draws one picture; called with each frame. */
     frame(now) {
       if (last.shaft === null) return;
-      const coast = still.matches || Math.abs(last.speed) > BLUR_RPM ? 0 : Math.min(now - since, COAST);
+      const coast =
+        still.matches || Math.abs(last.speed) > BLUR_RPM ? 0 : Math.min(now - since, COAST);
       const turn = last.shaft + (last.speed / 60_000) * Math.max(coast, 0);
       const angle = `rotate(${(modulo(turn, 1) * 360).toFixed(2)})`;
       setAttribute(disc, "transform", angle);
@@ -152,14 +175,20 @@ function tracks() {
 
 function ring(from, to, inner, outer) {
   const large = to - from > 0.5 ? 1 : 0;
-  return `M${point(from, outer)}A${outer} ${outer} 0 ${large} 1 ${point(to, outer)}` +
-    `L${point(to, inner)}A${inner} ${inner} 0 ${large} 0 ${point(from, inner)}Z`;
+  return (
+    `M${point(from, outer)}A${outer} ${outer} 0 ${large} 1 ${point(to, outer)}` +
+    `L${point(to, inner)}A${inner} ${inner} 0 ${large} 0 ${point(from, inner)}Z`
+  );
 }
 
 function shaftEnd(shaft) {
   const hub = svg("circle", { class: "hub", r: 30 });
   if (shaft === "hollow") {
-    return [hub, svg("circle", { class: "bore", r: 19 }), svg("path", { class: "bore", d: "M-4-17h8v-6h-8Z" })];
+    return [
+      hub,
+      svg("circle", { class: "bore", r: 19 }),
+      svg("path", { class: "bore", d: "M-4-17h8v-6h-8Z" }),
+    ];
   }
   if (shaft !== "solid") return [hub];
   return [hub, svg("path", { class: "shaft-end", d: "M-11.5-12 A16.6 16.6 0 1 0 11.5-12Z" })];

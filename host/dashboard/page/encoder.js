@@ -47,18 +47,39 @@ export function createEncoder({ plant, bus, device, live, history }) {
     (text, index, all) => text && all.indexOf(text) === index,
   );
   const root = element(
-    "div", { class: "encoder" },
-    element("div", { class: "encoder-head" },
-      element("nav", { "aria-label": "Encoders", class: "trail" },
-        element("a", { href: "#/" }, "All encoders"), ...neighbours(plant, place)),
-      element("div", { class: "names" },
-        heading, element("p", { class: "model" }, subtitle.join(" · "))),
-      context.locked ? element("p", { class: "notice" }, context.locked) : null),
+    "div",
+    { class: "encoder" },
+    element(
+      "div",
+      { class: "encoder-head" },
+      element(
+        "nav",
+        { "aria-label": "Encoders", class: "trail" },
+        element("a", { href: "#/" }, "All encoders"),
+        ...neighbours(plant, place),
+      ),
+      element(
+        "div",
+        { class: "names" },
+        heading,
+        element("p", { class: "model" }, subtitle.join(" · ")),
+      ),
+      context.locked ? element("p", { class: "notice" }, context.locked) : null,
+    ),
     element("div", { class: "top" }, parts.shaft.root, parts.measured.root, parts.device.root),
-    element("div", { class: "lower" },
+    element(
+      "div",
+      { class: "lower" },
       element("div", { class: "column wide" }, objects.root, trace.root),
-      element("div", { class: "column" },
-        parts.memory.root, createHilo().root, parts.faults.root, reports.root)),
+      element(
+        "div",
+        { class: "column" },
+        parts.memory.root,
+        createHilo().root,
+        parts.faults.root,
+        reports.root,
+      ),
+    ),
   );
   let changed = true;
 
@@ -89,8 +110,10 @@ export function createEncoder({ plant, bus, device, live, history }) {
 
 function neighbours(plant, place) {
   const all = plant.buses.flatMap((bus) =>
-    bus.devices.map((device) => ({ bus: bus.id, device: device.id })));
+    bus.devices.map((device) => ({ bus: bus.id, device: device.id })),
+  );
   const here = all.findIndex((one) => one.bus === place.bus && one.device === place.device);
-  const link = (text, one) => (one ? element("a", { href: linkTo(one) }, `${text} ${one.device}`) : null);
+  const link = (text, one) =>
+    one ? element("a", { href: linkTo(one) }, `${text} ${one.device}`) : null;
   return [link("Previous:", all[here - 1]), link("Next:", all[here + 1])];
 }

@@ -11,7 +11,8 @@ const EXAMPLES = { integer: "4000", probability: "0.5", time: "20ms" };
 export function createFaults({ device, locked, send }) {
   const { root, body } = panel("Faults to provoke", "faults");
   const levers = device.faults.map((fault) => createLever(fault, { locked, send }));
-  if (levers.length === 0) body.append(element("p", { class: "hint" }, "Nothing can go wrong with it here."));
+  if (levers.length === 0)
+    body.append(element("p", { class: "hint" }, "Nothing can go wrong with it here."));
   else body.append(element("ul", { class: "levers" }, ...levers.map((lever) => lever.root)));
   return {
     root,
@@ -37,18 +38,37 @@ function createLever(fault, { locked, send }) {
     }
     return outcome.of(send("POST", "faults", body));
   };
-  const clear = button("Clear", () => outcome.of(send("DELETE", `faults/${encodeURIComponent(fault.kind)}`)), {
-    disabled, hidden: true, "aria-label": `Clear: ${fault.title}`,
-  });
-  const start = element("button", {
-    type: "submit", disabled, title: locked, "aria-label": `Provoke: ${fault.title}`,
-  }, "Provoke");
+  const clear = button(
+    "Clear",
+    () => outcome.of(send("DELETE", `faults/${encodeURIComponent(fault.kind)}`)),
+    {
+      disabled,
+      hidden: true,
+      "aria-label": `Clear: ${fault.title}`,
+    },
+  );
+  const start = element(
+    "button",
+    {
+      type: "submit",
+      disabled,
+      title: locked,
+      "aria-label": `Provoke: ${fault.title}`,
+    },
+    "Provoke",
+  );
   const root = element(
-    "li", { class: "lever" },
-    element("form", { onsubmit: provoke },
+    "li",
+    { class: "lever" },
+    element(
+      "form",
+      { onsubmit: provoke },
       element("div", { class: "lever-head" }, element("h3", {}, fault.title), badge, clear, start),
       element("p", { class: "hint" }, fault.help),
-      fields.length ? element("div", { class: "lever-fields" }, ...fields.map((field) => field.root)) : null),
+      fields.length
+        ? element("div", { class: "lever-fields" }, ...fields.map((field) => field.root))
+        : null,
+    ),
     outcome.root,
   );
   return {
@@ -66,13 +86,24 @@ function createLever(fault, { locked, send }) {
 function createField({ name, type, required, default: usual, help }, disabled) {
   const id = freshId("fault");
   const input = element("input", {
-    id, type: "text", size: 9, autocomplete: "off", disabled, required, title: help,
+    id,
+    type: "text",
+    size: 9,
+    autocomplete: "off",
+    disabled,
+    required,
+    title: help,
     placeholder: usual ?? (required ? EXAMPLES[type] : null),
   });
   return {
     name,
-    root: element("div", { class: "lever-field" }, element("label", { for: id }, name), input,
-      help ? element("span", { class: "fine" }, help) : null),
+    root: element(
+      "div",
+      { class: "lever-field" },
+      element("label", { for: id }, name),
+      input,
+      help ? element("span", { class: "fine" }, help) : null,
+    ),
     read() {
       const text = input.value.trim();
       if (text === "") return { value: null };

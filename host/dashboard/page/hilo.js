@@ -9,7 +9,13 @@ export function createHilo() {
   const { root, body } = panel("Hi and lo word", "hilo");
   const field = (name, size) => {
     const id = freshId("word");
-    const input = element("input", { id, type: "text", size, inputmode: "text", autocomplete: "off" });
+    const input = element("input", {
+      id,
+      type: "text",
+      size,
+      inputmode: "text",
+      autocomplete: "off",
+    });
     const hex = element("span", { class: "fine number" });
     const seat = element("div", { class: "word" }, element("label", { for: id }, name), input, hex);
     return { seat, input, hex };

@@ -30,9 +30,9 @@ export class History {
     }
     const on = device?.power;
     this.#times[place] = at;
-    this.#columns.position[place] = on ? device.position ?? NaN : NaN;
+    this.#columns.position[place] = on ? (device.position ?? NaN) : NaN;
     this.#columns.polled[place] = device?.master?.position ?? NaN;
-    this.#columns.rpm[place] = on ? device.rpm ?? NaN : NaN;
+    this.#columns.rpm[place] = on ? (device.rpm ?? NaN) : NaN;
   }
 
   /**

@@ -23,18 +23,31 @@ export function createMeasured({ device, live }, history) {
   const total = element("span", { class: "number" }, NOTHING);
   const trend = createTrend(history);
   body.append(
-    element("div", { class: "positions" },
-      element("div", { class: "position-own" },
+    element(
+      "div",
+      { class: "positions" },
+      element(
+        "div",
+        { class: "position-own" },
         element("h3", {}, "Position"),
         element("p", { class: "huge" }, position, element("span", { class: "unit" }, "steps")),
-        element("p", { class: "fine" }, hex)),
-      element("div", { class: "position-polled" },
+        element("p", { class: "fine" }, hex),
+      ),
+      element(
+        "div",
+        { class: "position-polled" },
         element("h3", {}, "At the master"),
         element("p", { class: "huge" }, polled),
-        asked)),
+        asked,
+      ),
+    ),
     element("dl", { class: "readings" }, angle.root, turns.root, rpm.root, code.root),
-    element("div", { class: "range" }, range,
-      element("p", { class: "fine" }, share, " of the measuring range of ", total, " steps")),
+    element(
+      "div",
+      { class: "range" },
+      range,
+      element("p", { class: "fine" }, share, " of the measuring range of ", total, " steps"),
+    ),
     trend.root,
   );
   return {

@@ -14,7 +14,12 @@ export function createMemory({ device, locked, send }) {
   const unsaved = element("p", { class: "unsaved" });
   const id = freshId("preset");
   const value = element("input", {
-    id, type: "text", inputmode: "numeric", value: "0", autocomplete: "off", disabled,
+    id,
+    type: "text",
+    inputmode: "numeric",
+    value: "0",
+    autocomplete: "off",
+    disabled,
   });
   const preset = (event) => {
     event.preventDefault();
@@ -30,18 +35,32 @@ export function createMemory({ device, locked, send }) {
     button(name, () => outcome.of(send("POST", path)), { disabled, title: help });
   const { root, body } = panel("Preset and memory", "memory");
   body.append(
-    element("form", { class: "preset", onsubmit: preset },
+    element(
+      "form",
+      { class: "preset", onsubmit: preset },
       element("label", { for: id }, "The position here becomes"),
-      element("div", { class: "field-row" }, value,
-        element("button", { type: "submit", class: "main", disabled }, "Preset"))),
+      element(
+        "div",
+        { class: "field-row" },
+        value,
+        element("button", { type: "submit", class: "main", disabled }, "Preset"),
+      ),
+    ),
     element("dl", { class: "readings" }, state.root, writes.root, offset.root),
     unsaved,
-    element("div", { class: "choices-row" },
+    element(
+      "div",
+      { class: "choices-row" },
       action("Save", "save", "Keeps what is in force"),
       action("Restore", "restore", "Takes back what was saved"),
-      action("Reset", "reset", "Takes the defaults")),
-    element("p", { class: "hint" }, why(locked, device) ??
-      "Save keeps what is in force, Restore takes back what was saved, Reset takes the defaults."),
+      action("Reset", "reset", "Takes the defaults"),
+    ),
+    element(
+      "p",
+      { class: "hint" },
+      why(locked, device) ??
+        "Save keeps what is in force, Restore takes back what was saved, Reset takes the defaults.",
+    ),
     outcome.root,
   );
   return {
@@ -52,7 +71,12 @@ export function createMemory({ device, locked, send }) {
       setText(writes.value, whole(memory?.writes));
       setText(offset.value, whole(now?.power ? now.offset : undefined));
       const lost = memory?.unsaved ?? [];
-      setText(unsaved, lost.length ? `Not saved, lost with the power: ${lost.join(", ")}.` : "Nothing would be lost with the power.");
+      setText(
+        unsaved,
+        lost.length
+          ? `Not saved, lost with the power: ${lost.join(", ")}.`
+          : "Nothing would be lost with the power.",
+      );
       setAttribute(unsaved, "data-waits", lost.length > 0);
     },
   };
@@ -60,5 +84,5 @@ export function createMemory({ device, locked, send }) {
 
 function why(locked, device) {
   if (locked) return locked;
-  return device.editable ? null : device.why_not_editable ?? "It cannot be set here.";
+  return device.editable ? null : (device.why_not_editable ?? "It cannot be set here.");
 }

@@ -14,10 +14,15 @@ export function createObjects({ place, device, live, locked, send }) {
   const outcome = new Outcome();
   const { root, body } = panel("Objects", "objects");
   body.append(
-    element("div", { class: "filter" },
-      element("label", { for: findId }, "Find"), find,
-      element("span", { class: "tick" }, only, element("label", { for: onlyId }, "only settings"))),
-    outcome.root, seat,
+    element(
+      "div",
+      { class: "filter" },
+      element("label", { for: findId }, "Find"),
+      find,
+      element("span", { class: "tick" }, only, element("label", { for: onlyId }, "only settings")),
+    ),
+    outcome.root,
+    seat,
   );
   let rows = new Map();
   let groups = [];
@@ -26,7 +31,8 @@ export function createObjects({ place, device, live, locked, send }) {
   const filter = () => {
     const words = find.value.toLowerCase().split(/\s+/).filter(Boolean);
     for (const row of rows.values()) {
-      const found = words.every((word) => row.words.includes(word)) && (!only.checked || row.editable);
+      const found =
+        words.every((word) => row.words.includes(word)) && (!only.checked || row.editable);
       for (const line of row.lines) setAttribute(line, "data-hidden", !found);
     }
     for (const { root: table, keys } of groups) {
@@ -49,7 +55,8 @@ export function createObjects({ place, device, live, locked, send }) {
     const keys = told.flatMap((group) => group.objects.map((object) => object.key));
     // The same rows again: only their values are written, so nobody loses what is being typed.
     if (keys.length === rows.size && keys.every((key) => rows.has(key))) {
-      for (const group of told) for (const object of group.objects) rows.get(object.key).learn(object);
+      for (const group of told)
+        for (const object of group.objects) rows.get(object.key).learn(object);
       return;
     }
     rows = new Map();
@@ -64,7 +71,13 @@ export function createObjects({ place, device, live, locked, send }) {
   const follow = () => {
     const now = live.device(place);
     // What is saved and what may be set is another one after these.
-    const next = [now?.power, now?.memory?.writes, now?.steps_per_turn, now?.total_resolution, now?.network?.state].join();
+    const next = [
+      now?.power,
+      now?.memory?.writes,
+      now?.steps_per_turn,
+      now?.total_resolution,
+      now?.network?.state,
+    ].join();
     if (next === standing) return;
     standing = next;
     read();
@@ -84,7 +97,10 @@ export function createObjects({ place, device, live, locked, send }) {
 
 function createGroup({ title, objects }, rows, context) {
   const head = ["Number", "Name", "Value", "Saved", ""].map((name) =>
-    name ? element("th", { scope: "col" }, name) : element("th", { scope: "col" }, element("span", { class: "unseen" }, "Change")));
+    name
+      ? element("th", { scope: "col" }, name)
+      : element("th", { scope: "col" }, element("span", { class: "unseen" }, "Change")),
+  );
   const keeps = objects.some((object) => object.saved != null);
   const body = element("tbody");
   for (const object of objects) {
@@ -92,8 +108,13 @@ function createGroup({ title, objects }, rows, context) {
     rows.set(object.key, row);
     body.append(...row.lines);
   }
-  const root = element("table", { class: keeps ? "object-table" : "object-table unkept" },
-    element("caption", {}, title), element("thead", {}, element("tr", {}, ...head)), body);
+  const root = element(
+    "table",
+    { class: keeps ? "object-table" : "object-table unkept" },
+    element("caption", {}, title),
+    element("thead", {}, element("tr", {}, ...head)),
+    body,
+  );
   return { root, keys: objects.map((object) => object.key) };
 }
 
@@ -104,17 +125,26 @@ function createRow(first, { locked, send }) {
   const saved = element("span", { class: "number" });
   const name = element("span", { class: "object-name" }, object.title);
   const help = [object.help, object.note].filter(Boolean).map(sentence).join(" ");
-  const change = element("button", { type: "button", class: "quiet", "aria-expanded": "false", onclick: () => toggle() }, "Change");
+  const change = element(
+    "button",
+    { type: "button", class: "quiet", "aria-expanded": "false", onclick: () => toggle() },
+    "Change",
+  );
   const outcome = new Outcome();
   const editorSeat = element("td", { colspan: 5 }, outcome.root);
   const editorLine = element("tr", { class: "editor", hidden: true }, editorSeat);
   const lastCell = element("td", { class: "change" });
   const line = element(
-    "tr", {},
+    "tr",
+    {},
     element("td", { class: "place" }, object.place),
-    element("td", { class: "name" }, name,
+    element(
+      "td",
+      { class: "name" },
+      name,
       element("span", { class: "fine key-name" }, ` ${object.key}`),
-      help ? element("span", { class: "help" }, help) : null),
+      help ? element("span", { class: "help" }, help) : null,
+    ),
     element("td", { class: "value" }, value),
     element("td", { class: "saved" }, saved),
     lastCell,
@@ -155,7 +185,9 @@ function createRow(first, { locked, send }) {
     change.focus();
   }
   async function write(next) {
-    const done = await outcome.of(send("PUT", `objects/${encodeURIComponent(object.key)}`, { value: next }));
+    const done = await outcome.of(
+      send("PUT", `objects/${encodeURIComponent(object.key)}`, { value: next }),
+    );
     editorLine.hidden = false;
     if (done) close();
   }
@@ -175,11 +207,18 @@ function createEditor(object, { close, write }) {
   const id = freshId("value");
   const field = object.values?.length
     ? element("select", { id }, ...choices(object))
-    : element("input", { id, type: "text", autocomplete: "off", value: object.value ?? "", inputmode: "text" });
+    : element("input", {
+        id,
+        type: "text",
+        autocomplete: "off",
+        value: object.value ?? "",
+        inputmode: "text",
+      });
   const difference = element("span", { class: "difference number" });
   const allowed = object.range ? `${whole(object.range[0])} … ${whole(object.range[1])}` : "";
   const read = () => {
-    if (object.values?.length) return typeof object.value === "number" ? Number(field.value) : field.value;
+    if (object.values?.length)
+      return typeof object.value === "number" ? Number(field.value) : field.value;
     if (typeof object.value !== "number" && object.value != null) return field.value;
     return parseWhole(field.value);
   };
@@ -187,9 +226,12 @@ function createEditor(object, { close, write }) {
     const next = read();
     const split = typeof next === "number" && !object.values?.length ? splitWords(next) : null;
     const words = split ? ` = ${hexadecimal(next)}, hi ${split.hi}, lo ${split.lo}` : "";
-    setText(difference, next === null
-      ? "Write a whole number, as 921600 or E1000h."
-      : `${shown(object, object.value)} → ${shown(object, next)}${words}`);
+    setText(
+      difference,
+      next === null
+        ? "Write a whole number, as 921600 or E1000h."
+        : `${shown(object, object.value)} → ${shown(object, next)}${words}`,
+    );
   };
   field.addEventListener("input", compare);
   const submit = (event) => {
@@ -198,7 +240,8 @@ function createEditor(object, { close, write }) {
     if (next !== null) write(next);
   };
   const root = element(
-    "form", { class: "edit", onsubmit: submit },
+    "form",
+    { class: "edit", onsubmit: submit },
     element("label", { for: id }, `${object.title}${object.unit ? ` in ${object.unit}` : ""}`),
     field,
     element("button", { type: "submit", class: "main" }, "Write"),

@@ -26,7 +26,8 @@ export function createOverview(plant, live) {
   const reports = createReports(live, { title: "Events" });
   const heading = element("h1", { tabindex: -1 }, "Encoders");
   const root = element(
-    "div", { class: encoders > MANY ? "overview many" : "overview" },
+    "div",
+    { class: encoders > MANY ? "overview many" : "overview" },
     element("div", { class: "overview-head" }, heading, counts, find.root),
     ...heads.map((bus) => bus.root),
     reports.root,
@@ -77,15 +78,26 @@ function summary(cards) {
 
 function createFilter(apply) {
   const [findId, onlyId] = [freshId("find"), freshId("only")];
-  const text = element("input", { type: "search", id: findId, placeholder: "name, model, address" });
+  const text = element("input", {
+    type: "search",
+    id: findId,
+    placeholder: "name, model, address",
+  });
   const only = element("input", { type: "checkbox", id: onlyId });
   const again = () => apply(text.value.toLowerCase().split(/\s+/).filter(Boolean), only.checked);
   text.addEventListener("input", again);
   only.addEventListener("change", again);
   const root = element(
-    "form", { class: "filter", role: "search", onsubmit: (event) => event.preventDefault() },
-    element("label", { for: findId }, "Find"), text,
-    element("span", { class: "tick" }, only, element("label", { for: onlyId }, "only with trouble")),
+    "form",
+    { class: "filter", role: "search", onsubmit: (event) => event.preventDefault() },
+    element("label", { for: findId }, "Find"),
+    text,
+    element(
+      "span",
+      { class: "tick" },
+      only,
+      element("label", { for: onlyId }, "only with trouble"),
+    ),
   );
   return { root, again, wantsTrouble: () => only.checked };
 }
@@ -110,16 +122,22 @@ function createBus(bus, readOnly, cards) {
     grid.append(card.root);
   }
   const facts = element(
-    "dl", { class: "bus-facts" },
+    "dl",
+    { class: "bus-facts" },
     fact("bit rate", element("span", {}, bus.bit_rate)),
     fact("load", element("span", {}, bar, load)),
     ...[...masters.values()].map((master) => master.root),
     fact("port", element("span", { class: "port" }, bus.uri)),
   );
   const root = element(
-    "section", { class: "bus", "aria-labelledby": id },
-    element("div", { class: "bus-head" },
-      element("h2", { id }, bus.id, element("span", { class: "kind" }, bus.bus)), facts),
+    "section",
+    { class: "bus", "aria-labelledby": id },
+    element(
+      "div",
+      { class: "bus-head" },
+      element("h2", { id }, bus.id, element("span", { class: "kind" }, bus.bus)),
+      facts,
+    ),
     grid,
   );
   return {
@@ -145,7 +163,11 @@ function createMaster({ id, address }) {
     update(now) {
       if (!now) setText(text, NOTHING);
       else if (!now.on_line) setText(text, "off-line");
-      else setText(text, `cycle ${milliseconds(now.cycle_ms)}, longest ${milliseconds(now.longest_ms)}`);
+      else
+        setText(
+          text,
+          `cycle ${milliseconds(now.cycle_ms)}, longest ${milliseconds(now.longest_ms)}`,
+        );
     },
   };
 }
@@ -161,7 +183,12 @@ function standing(device) {
 
 /** What the badge of a card says. */
 const STANDINGS = {
-  unknown: "", off: "no power", alarm: "alarm", warning: "warning", fault: "fault provoked", good: "",
+  unknown: "",
+  off: "no power",
+  alarm: "alarm",
+  warning: "warning",
+  fault: "fault provoked",
+  good: "",
 };
 const FINE = ["good", "unknown"];
 
@@ -177,22 +204,41 @@ function createCard(place, fixed_, readOnly) {
   const cell = (name, ...value) =>
     element("div", {}, element("dt", {}, name), element("dd", {}, ...value));
   const root = element(
-    "li", { class: "card" },
-    element("div", { class: "card-head" },
+    "li",
+    { class: "card" },
+    element(
+      "div",
+      { class: "card-head" },
       element("h3", { id }, element("a", { href: linkTo(place) }, fixed_.id)),
-      element("span", { class: "model" }, fixed_.title), power.root),
-    element("div", { class: "card-main" }, dial.root,
-      element("div", { class: "card-position" },
+      element("span", { class: "model" }, fixed_.title),
+      power.root,
+    ),
+    element(
+      "div",
+      { class: "card-main" },
+      dial.root,
+      element(
+        "div",
+        { class: "card-position" },
         element("p", { class: "big" }, position),
         element("p", { class: "fine" }, angle, " · turn ", turns),
-        element("p", { class: "fine" }, speed, " rpm"))),
+        element("p", { class: "fine" }, speed, " rpm"),
+      ),
+    ),
     element("div", { class: "card-lamp" }, lamp.root, alarm),
-    element("dl", { class: "card-facts" },
-      cell("address", address), cell("state", state), cell("master", master)),
+    element(
+      "dl",
+      { class: "card-facts" },
+      cell("address", address),
+      cell("state", state),
+      cell("master", master),
+    ),
     power.outcome.root,
   );
   const card = {
-    root, place, standing: "unknown",
+    root,
+    place,
+    standing: "unknown",
     words: `${place.bus} ${fixed_.id} ${fixed_.model} ${fixed_.title}`.toLowerCase(),
     update(device) {
       dial.update(device, fixed_);
@@ -203,7 +249,7 @@ function createCard(place, fixed_, readOnly) {
       setText(turns, on ? whole(device.turns) : NOTHING);
       setText(speed, on ? fixed(device.rpm, 1) : NOTHING);
       setText(address, device?.address ?? NOTHING);
-      setText(state, on ? device.state ?? NOTHING : device ? "no power" : NOTHING);
+      setText(state, on ? (device.state ?? NOTHING) : device ? "no power" : NOTHING);
       setText(master, masterText(device?.master));
       card.standing = standing(device);
       setAttribute(root, "data-standing", card.standing);
@@ -226,9 +272,16 @@ function createPower(place, name, readOnly) {
   const word = element("span", {}, NOTHING);
   const root = element(
     "button",
-    { type: "button", class: "power", "aria-pressed": "false", disabled: true,
-      title: readOnly ? "The page is read-only." : "Power", onclick: () => send() },
-    element("span", { class: "unseen" }, `Power of ${name} `), word,
+    {
+      type: "button",
+      class: "power",
+      "aria-pressed": "false",
+      disabled: true,
+      title: readOnly ? "The page is read-only." : "Power",
+      onclick: () => send(),
+    },
+    element("span", { class: "unseen" }, `Power of ${name} `),
+    word,
   );
   async function send() {
     try {

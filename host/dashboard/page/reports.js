@@ -15,7 +15,12 @@ const SHOWN = 60;
 export function createReports(live, { title, only }) {
   const list = element("ol", { class: "reports" });
   const none = element("p", { class: "hint" }, "Nothing has happened yet.");
-  const seat = element("div", { class: "scroll", tabindex: 0, role: "group", "aria-label": title }, none, list);
+  const seat = element(
+    "div",
+    { class: "scroll", tabindex: 0, role: "group", "aria-label": title },
+    none,
+    list,
+  );
   const { root, body } = panel(title, "events");
   body.append(seat);
 
@@ -24,7 +29,8 @@ export function createReports(live, { title, only }) {
   const entry = (report) => {
     const from = [report.bus, report.device].filter(Boolean).join("/");
     return element(
-      "li", { class: report.trouble ? "trouble" : null },
+      "li",
+      { class: report.trouble ? "trouble" : null },
       element("time", {}, clock(report.at, 2)),
       only ? null : element("span", { class: "from" }, from),
       element("span", {}, report.trouble ? element("strong", {}, "! ") : null, report.text),

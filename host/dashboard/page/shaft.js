@@ -19,7 +19,8 @@ const CHOICES = [
 export function createShaft({ device, locked, send }) {
   const dial = createLargeDial(device.shaft);
   const outcome = new Outcome();
-  const why = locked ?? (device.can_turn ? null : device.why_not_turned ?? "It cannot be turned here.");
+  const why =
+    locked ?? (device.can_turn ? null : (device.why_not_turned ?? "It cannot be turned here."));
   const post = (body) => outcome.of(send("POST", "shaft", body));
   const quietly = async (body) => {
     try {
@@ -39,9 +40,12 @@ export function createShaft({ device, locked, send }) {
   const motion = createMotion(post, Boolean(why));
   const { root, body } = panel("Shaft", "shaft");
   body.append(
-    dial.root, arrow, turning.hint,
+    dial.root,
+    arrow,
+    turning.hint,
     element("p", { class: "motion-now" }, "Motion: ", now),
-    motion, outcome.root,
+    motion,
+    outcome.root,
   );
   return {
     root,
@@ -50,7 +54,12 @@ export function createShaft({ device, locked, send }) {
       turning.update(state, time);
       setText(now, state?.shaft?.motion ?? NOTHING);
       const direction = state?.direction;
-      setText(arrow, direction ? `Positions grow ${direction === "CCW" ? "counter-clockwise" : "clockwise"} (${direction}), seen looking at the flange.` : "");
+      setText(
+        arrow,
+        direction
+          ? `Positions grow ${direction === "CCW" ? "counter-clockwise" : "clockwise"} (${direction}), seen looking at the flange.`
+          : "",
+      );
     },
     frame(time, state) {
       dial.frame(time);
@@ -62,8 +71,13 @@ export function createShaft({ device, locked, send }) {
 function createMotion(post, disabled) {
   const id = freshId("motion");
   const text = element("input", {
-    id, type: "text", spellcheck: "false", autocomplete: "off", disabled,
-    placeholder: "turn rpm=60", "aria-describedby": `${id}-hint`,
+    id,
+    type: "text",
+    spellcheck: "false",
+    autocomplete: "off",
+    disabled,
+    placeholder: "turn rpm=60",
+    "aria-describedby": `${id}-hint`,
   });
   const go = (event) => {
     event.preventDefault();
@@ -74,16 +88,32 @@ function createMotion(post, disabled) {
     post(motion === "still" ? { stop: true } : { motion });
   };
   return element(
-    "form", { class: "motion", onsubmit: go },
-    element("div", { class: "choices-row", role: "group", "aria-label": "Motions to choose from" },
+    "form",
+    { class: "motion", onsubmit: go },
+    element(
+      "div",
+      { class: "choices-row", role: "group", "aria-label": "Motions to choose from" },
       ...CHOICES.map(([name, motion]) =>
-        button(name, () => choose(motion), { disabled, title: motion }))),
+        button(name, () => choose(motion), { disabled, title: motion }),
+      ),
+    ),
     element("label", { for: id }, "Another motion"),
-    element("div", { class: "field-row" }, text,
-      element("button", { type: "submit", disabled }, "Go")),
-    element("p", { class: "hint", id: `${id}-hint` },
-      "As ", element("code", {}, "turn rpm=60"), ", ",
-      element("code", {}, "sine amplitude=90deg period=2s"), " or ",
-      element("code", {}, "profile 0s:0 1s:90deg 3s:2turns"), "."),
+    element(
+      "div",
+      { class: "field-row" },
+      text,
+      element("button", { type: "submit", disabled }, "Go"),
+    ),
+    element(
+      "p",
+      { class: "hint", id: `${id}-hint` },
+      "As ",
+      element("code", {}, "turn rpm=60"),
+      ", ",
+      element("code", {}, "sine amplitude=90deg period=2s"),
+      " or ",
+      element("code", {}, "profile 0s:0 1s:90deg 3s:2turns"),
+      ".",
+    ),
   );
 }

@@ -65,6 +65,16 @@ export class PlantState extends EventTarget {
     this.#open();
   }
 
+  /** Lets go of the stream, as nobody looks. {@link wake} takes it up again. */
+  sleep() {
+    this.#close();
+  }
+
+  /** Takes the stream up again, where it was let go. */
+  wake() {
+    if (!this.#source) this.#open();
+  }
+
   #open() {
     this.#close();
     this.#fresh = true;

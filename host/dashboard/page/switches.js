@@ -15,21 +15,30 @@ export function createSwitches({ device, locked, send }) {
   const put = (changes) => outcome.of(send("PUT", "switches", { ...set, ...changes }));
 
   const rotary = device.switches.rotary.map((fixed, place) =>
-    createRotary(fixed, disabled, (digit) => put({ rotary: set.rotary.with(place, digit) })));
+    createRotary(fixed, disabled, (digit) => put({ rotary: set.rotary.with(place, digit) })),
+  );
   const dip = device.switches.dip.map((fixed, place) =>
-    createDip(`DIP ${fixed.label}`, fixed.meaning?.split(":")[0], disabled, (on) => put({ dip: set.dip.with(place, on) })));
+    createDip(`DIP ${fixed.label}`, fixed.meaning?.split(":")[0], disabled, (on) =>
+      put({ dip: set.dip.with(place, on) }),
+    ),
+  );
   const termination = createDip("Termination", "terminating resistor", disabled, (on) =>
-    put({ termination: on }));
+    put({ termination: on }),
+  );
   // "bit rate: 2 and 3 OFF OFF 125k, …" stands once for both switches, its first words at each.
-  const legend = new Set(device.switches.dip.map((fixed) => fixed.meaning).filter((text) => text?.includes(":")));
+  const legend = new Set(
+    device.switches.dip.map((fixed) => fixed.meaning).filter((text) => text?.includes(":")),
+  );
   const pending = element("p", { class: "pending" });
   const root = element(
-    "div", { class: "switches" },
+    "div",
+    { class: "switches" },
     element("h3", {}, "Switches"),
     element("div", { class: "rotaries" }, ...rotary.map((one) => one.root)),
     element("div", { class: "dips" }, ...dip.map((one) => one.root), termination.root),
     ...[...legend].map((text) => element("p", { class: "hint" }, text)),
-    pending, outcome.root,
+    pending,
+    outcome.root,
   );
   return {
     root,
@@ -42,9 +51,12 @@ export function createSwitches({ device, locked, send }) {
       dip.forEach((one, place) => one.update(Boolean(set.dip[place])));
       termination.update(set.termination);
       const waits = on ? waiting(switches) : [];
-      setText(pending, waits.length
-        ? `Acts at the next power-up: ${waits.join("; ")}.`
-        : "The device reads its switches at power-up; the terminating resistor acts at once.");
+      setText(
+        pending,
+        waits.length
+          ? `Acts at the next power-up: ${waits.join("; ")}.`
+          : "The device reads its switches at power-up; the terminating resistor acts at once.",
+      );
       setAttribute(pending, "data-waits", waits.length > 0);
     },
   };
@@ -65,21 +77,36 @@ function waiting({ now, at_power_up, dip, dip_at_power_up }) {
 
 function createRotary({ label, digits, meaning }, disabled, turn) {
   let now = 0;
-  const pointer = svg("g", { class: "rotary-pointer" },
-    svg("circle", { r: 17 }), svg("path", { d: "M-3.2 12V-6h-3.6L0-15 6.8-6H3.2V12Z" }));
+  const pointer = svg(
+    "g",
+    { class: "rotary-pointer" },
+    svg("circle", { r: 17 }),
+    svg("path", { d: "M-3.2 12V-6h-3.6L0-15 6.8-6H3.2V12Z" }),
+  );
   const marks = Array.from({ length: digits }, (_, digit) => {
     const angle = (digit / digits) * 2 * Math.PI;
     const [x, y] = [Math.sin(angle) * 29, -Math.cos(angle) * 29];
     return svg("text", { x: x.toFixed(1), y: y.toFixed(1) }, String(digit));
   });
   const picture = svg(
-    "svg", { viewBox: "-40 -40 80 80", "aria-hidden": "true" },
-    svg("rect", { class: "rotary-case", x: -39, y: -39, width: 78, height: 78, rx: 5 }), ...marks, pointer,
+    "svg",
+    { viewBox: "-40 -40 80 80", "aria-hidden": "true" },
+    svg("rect", { class: "rotary-case", x: -39, y: -39, width: 78, height: 78, rx: 5 }),
+    ...marks,
+    pointer,
   );
   const spin = element(
     "div",
-    { class: "rotary", role: "spinbutton", tabindex: 0, "aria-label": `Rotary switch ${label}${meaning ? `, ${meaning}` : ""}`,
-      "aria-valuemin": 0, "aria-valuemax": digits - 1, "aria-valuenow": 0, "aria-disabled": disabled ? "true" : null },
+    {
+      class: "rotary",
+      role: "spinbutton",
+      tabindex: 0,
+      "aria-label": `Rotary switch ${label}${meaning ? `, ${meaning}` : ""}`,
+      "aria-valuemin": 0,
+      "aria-valuemax": digits - 1,
+      "aria-valuenow": 0,
+      "aria-disabled": disabled ? "true" : null,
+    },
     picture,
   );
   const to = (digit) => {
@@ -103,8 +130,16 @@ function createRotary({ label, digits, meaning }, disabled, turn) {
     const digit = Math.round((Math.atan2(x, -y) / (2 * Math.PI)) * digits);
     to(inMiddle ? now + 1 : modulo(digit, digits));
   });
-  const root = element("div", { class: "rotary-seat" }, spin,
-    element("span", { class: "fine", "aria-hidden": "true" }, `switch ${label}${meaning ? ` ${meaning}` : ""}`));
+  const root = element(
+    "div",
+    { class: "rotary-seat" },
+    spin,
+    element(
+      "span",
+      { class: "fine", "aria-hidden": "true" },
+      `switch ${label}${meaning ? ` ${meaning}` : ""}`,
+    ),
+  );
   return {
     root,
     update(digit) {
@@ -122,13 +157,28 @@ function createDip(title, meaning, disabled, turn) {
   const word = element("span", { class: "dip-word", "aria-hidden": "true" }, "OFF");
   const toggle = element(
     "button",
-    { type: "button", role: "switch", class: "dip", "aria-checked": "false", "aria-labelledby": id,
-      disabled, onclick: () => turn(!now) },
-    element("span", { class: "dip-knob", "aria-hidden": "true" }), word,
+    {
+      type: "button",
+      role: "switch",
+      class: "dip",
+      "aria-checked": "false",
+      "aria-labelledby": id,
+      disabled,
+      onclick: () => turn(!now),
+    },
+    element("span", { class: "dip-knob", "aria-hidden": "true" }),
+    word,
   );
   const root = element(
-    "div", { class: "dip-seat" }, toggle,
-    element("span", { id, class: "dip-name" }, title, meaning ? element("span", { class: "fine" }, meaning) : null),
+    "div",
+    { class: "dip-seat" },
+    toggle,
+    element(
+      "span",
+      { id, class: "dip-name" },
+      title,
+      meaning ? element("span", { class: "fine" }, meaning) : null,
+    ),
   );
   return {
     root,

@@ -14,10 +14,12 @@ const PERIOD = 100;
  * @param {string[]} words in lower case
  */
 export function matches(line, words) {
-  const text = [line.from, line.to, line.identifier, line.name, line.text, line.octets].join(" ").toLowerCase();
-  return words.every((word) => (word.startsWith("-") && word.length > 1
-    ? !text.includes(word.slice(1))
-    : text.includes(word)));
+  const text = [line.from, line.to, line.identifier, line.name, line.text, line.octets]
+    .join(" ")
+    .toLowerCase();
+  return words.every((word) =>
+    word.startsWith("-") && word.length > 1 ? !text.includes(word.slice(1)) : text.includes(word),
+  );
 }
 
 /** The panel of the trace of a bus, at first for one device. */
@@ -25,40 +27,75 @@ export function createTrace(bus, device, live) {
   const lines = [];
   let [lost, drawn, dirty, listening, paused] = [0, 0, true, false, false];
   const [findId, ownId] = [freshId("trace"), freshId("trace")];
-  const find = element("input", { type: "search", id: findId, placeholder: "response -acknowledge" });
+  const find = element("input", {
+    type: "search",
+    id: findId,
+    placeholder: "response -acknowledge",
+  });
   const own = element("input", { type: "checkbox", id: ownId, checked: true });
   const touch = () => (dirty = true);
   find.addEventListener("input", touch);
   own.addEventListener("change", touch);
 
-  const listen = button("Listen", () => {
-    listening = !listening;
-    live.want({ trace: listening ? bus : null });
-    show();
-  }, { "aria-pressed": "false" });
-  const pause = button("Pause", () => {
-    paused = !paused;
-    show();
-  }, { "aria-pressed": "false", hidden: true });
-  const clear = button("Clear", () => {
-    lines.length = lost = 0;
-    touch();
-  }, { hidden: true });
+  const listen = button(
+    "Listen",
+    () => {
+      listening = !listening;
+      live.want({ trace: listening ? bus : null });
+      show();
+    },
+    { "aria-pressed": "false" },
+  );
+  const pause = button(
+    "Pause",
+    () => {
+      paused = !paused;
+      show();
+    },
+    { "aria-pressed": "false", hidden: true },
+  );
+  const clear = button(
+    "Clear",
+    () => {
+      lines.length = lost = 0;
+      touch();
+    },
+    { hidden: true },
+  );
   const counted = element("p", { class: "hint" });
   const rows = [];
   const rowsSeat = element("tbody");
   const head = ["time", "from", "to", "what", "says", "octets"].map((name) =>
-    element("th", { scope: "col" }, name));
-  const table = element("table", { class: "trace-table" },
+    element("th", { scope: "col" }, name),
+  );
+  const table = element(
+    "table",
+    { class: "trace-table" },
     element("caption", { class: "unseen" }, "Traffic of the bus, newest first"),
-    element("thead", {}, element("tr", {}, ...head)), rowsSeat);
-  const seat = element("div", { class: "scroll", tabindex: 0, role: "group", "aria-label": "Trace", hidden: true }, table);
+    element("thead", {}, element("tr", {}, ...head)),
+    rowsSeat,
+  );
+  const seat = element(
+    "div",
+    { class: "scroll", tabindex: 0, role: "group", "aria-label": "Trace", hidden: true },
+    table,
+  );
   const { root, body } = panel("Trace", "trace", pause, clear, listen);
   body.append(
-    element("div", { class: "filter" },
-      element("label", { for: findId }, "Filter"), find,
-      element("span", { class: "tick" }, own, element("label", { for: ownId }, `only ${device.id}`))),
-    counted, seat,
+    element(
+      "div",
+      { class: "filter" },
+      element("label", { for: findId }, "Filter"),
+      find,
+      element(
+        "span",
+        { class: "tick" },
+        own,
+        element("label", { for: ownId }, `only ${device.id}`),
+      ),
+    ),
+    counted,
+    seat,
   );
 
   function show() {
@@ -89,7 +126,9 @@ export function createTrace(bus, device, live) {
       dirty = false;
       drawn = now;
       const words = find.value.toLowerCase().split(/\s+/).filter(Boolean);
-      const address = own.checked ? String(live.device({ bus, device: device.id })?.address ?? "") : null;
+      const address = own.checked
+        ? String(live.device({ bus, device: device.id })?.address ?? "")
+        : null;
       // Who pauses wants to read all that is there.
       const shown = newest(lines, words, address, paused || !listening ? KEPT : DRAWN);
       fill(rowsSeat, rows, shown);
@@ -114,7 +153,8 @@ function newest(lines, words, address, most) {
   const found = [];
   for (let place = lines.length - 1; place >= 0 && found.length < most; place -= 1) {
     const line = lines[place];
-    const concerns = address === null || String(line.from) === address || String(line.to) === address;
+    const concerns =
+      address === null || String(line.from) === address || String(line.to) === address;
     if (concerns && matches(line, words)) found.push(line);
   }
   return found;

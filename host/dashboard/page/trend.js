@@ -29,9 +29,16 @@ export function createTrend(history) {
   const dots = svg("path", { class: "dots" });
   const chart = svg(
     "svg",
-    { class: "chart", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img",
-      "aria-label": "Trend of the last minute" },
-    svg("path", { class: "grid", d: grid() }), curve, dots,
+    {
+      class: "chart",
+      viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
+      preserveAspectRatio: "none",
+      role: "img",
+      "aria-label": "Trend of the last minute",
+    },
+    svg("path", { class: "grid", d: grid() }),
+    curve,
+    dots,
   );
   const cells = { max: element("td"), now: element("td"), min: element("td") };
   const name = freshId("quantity");
@@ -45,33 +52,64 @@ export function createTrend(history) {
       drawn = spoken = 0;
     };
     const input = element("input", {
-      type: "radio", id, name, checked: quantity === chosen, onchange: choose,
+      type: "radio",
+      id,
+      name,
+      checked: quantity === chosen,
+      onchange: choose,
     });
-    return element("span", { class: "choice" }, input,
-      element("label", { for: id }, QUANTITIES[quantity].title));
+    return element(
+      "span",
+      { class: "choice" },
+      input,
+      element("label", { for: id }, QUANTITIES[quantity].title),
+    );
   };
-  const row = (title, cell) =>
-    element("tr", {}, element("th", { scope: "row" }, title), cell);
+  const row = (title, cell) => element("tr", {}, element("th", { scope: "row" }, title), cell);
   const table = element(
-    "table", { class: "extremes" },
+    "table",
+    { class: "extremes" },
     element("caption", { class: "unseen" }, "The last minute in numbers"),
     element("tbody", {}, row("max", cells.max), row("now", cells.now), row("min", cells.min)),
   );
   const scale = ["\u221260 s", "\u221240 s", "\u221220 s", "now"];
   const root = element(
-    "div", { class: "trend" },
-    element("div", { class: "trend-head" },
-      element("fieldset", { class: "choices" },
+    "div",
+    { class: "trend" },
+    element(
+      "div",
+      { class: "trend-head" },
+      element(
+        "fieldset",
+        { class: "choices" },
         element("legend", { class: "unseen" }, "What the trend shows"),
-        choice("position"), choice("rpm")),
-      element("p", { class: "key" },
-        element("span", { class: "key-line" }), "measured ",
-        element("span", { class: "key-dots" }), "as the master got it")),
-    element("div", { class: "trend-row" },
-      element("div", { class: "trend-seat" }, chart,
-        element("div", { class: "scale", "aria-hidden": "true" },
-          ...scale.map((text) => element("span", {}, text)))),
-      table),
+        choice("position"),
+        choice("rpm"),
+      ),
+      element(
+        "p",
+        { class: "key" },
+        element("span", { class: "key-line" }),
+        "measured ",
+        element("span", { class: "key-dots" }),
+        "as the master got it",
+      ),
+    ),
+    element(
+      "div",
+      { class: "trend-row" },
+      element(
+        "div",
+        { class: "trend-seat" },
+        chart,
+        element(
+          "div",
+          { class: "scale", "aria-hidden": "true" },
+          ...scale.map((text) => element("span", {}, text)),
+        ),
+      ),
+      table,
+    ),
   );
 
   return {
@@ -86,15 +124,27 @@ export function createTrend(history) {
       const isPosition = chosen === "position";
       const place = placement(at, min, max);
       const round = isPosition ? device?.total_resolution : null;
-      setAttribute(curve, "d", min === null ? "" : lines(samples, at, round).map(place.line).join(""));
-      setAttribute(dots, "d", isPosition && min !== null ? dotted(history.last(at, "polled"), place) : "");
+      setAttribute(
+        curve,
+        "d",
+        min === null ? "" : lines(samples, at, round).map(place.line).join(""),
+      );
+      setAttribute(
+        dots,
+        "d",
+        isPosition && min !== null ? dotted(history.last(at, "polled"), place) : "",
+      );
       setText(cells.min, show(min));
       setText(cells.max, show(max));
       setText(cells.now, show(newest));
       if (now - spoken < SPEAK) return;
       spoken = now;
-      setAttribute(chart, "aria-label", `${title} in the last minute: lowest ${show(min)}, ` +
-        `highest ${show(max)}, now ${show(newest)} ${unit}`);
+      setAttribute(
+        chart,
+        "aria-label",
+        `${title} in the last minute: lowest ${show(min)}, ` +
+          `highest ${show(max)}, now ${show(newest)} ${unit}`,
+      );
     },
   };
 }

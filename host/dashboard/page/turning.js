@@ -67,19 +67,36 @@ export class TurnSender {
  */
 export function makeTurnable(seat, { steps, by, stop, why }) {
   const hint = element(
-    "p", { class: "hint", id: freshId("hint") },
+    "p",
+    { class: "hint", id: freshId("hint") },
     why ?? "Drag the dial, or focus it and press ",
   );
   if (!why) {
     const key = (name) => element("kbd", {}, name);
     hint.append(
-      key("←"), " ", key("→"), " one degree, with ", key("Shift"), " a quarter turn; ",
-      key("Page ↑"), " ", key("Page ↓"), " a turn; ", key("Home"), " stop.",
+      key("←"),
+      " ",
+      key("→"),
+      " one degree, with ",
+      key("Shift"),
+      " a quarter turn; ",
+      key("Page ↑"),
+      " ",
+      key("Page ↓"),
+      " a turn; ",
+      key("Home"),
+      " stop.",
     );
   }
   const attributes = {
-    role: "slider", tabindex: 0, "aria-label": "Shaft", "aria-valuemin": 0, "aria-valuemax": 360,
-    "aria-valuenow": 0, "aria-describedby": hint.id, "aria-disabled": why ? "true" : null,
+    role: "slider",
+    tabindex: 0,
+    "aria-label": "Shaft",
+    "aria-valuemin": 0,
+    "aria-valuemax": 360,
+    "aria-valuenow": 0,
+    "aria-describedby": hint.id,
+    "aria-disabled": why ? "true" : null,
   };
   for (const [name, value] of Object.entries(attributes)) setAttribute(seat, name, value);
   if (!why) {

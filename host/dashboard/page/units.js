@@ -11,7 +11,9 @@ const isNumber = (value) => typeof value === "number" && Number.isFinite(value);
 /** A whole number in groups of three digits: `12 345`. */
 export function whole(value) {
   if (!isNumber(value)) return NOTHING;
-  const digits = Math.abs(Math.round(value)).toString().replace(/\B(?=(\d{3})+$)/g, THIN);
+  const digits = Math.abs(Math.round(value))
+    .toString()
+    .replace(/\B(?=(\d{3})+$)/g, THIN);
   return value < 0 && digits !== "0" ? MINUS + digits : digits;
 }
 

@@ -14,16 +14,20 @@ use codewheel_station::can::Frame;
 use codewheel_station::{Deadline, Duration, Instant};
 
 use crate::MacId;
-use crate::explicit::{Error, GeneralStatus, Header, Service, frame};
+use crate::explicit::{BodyFormat, Error, GeneralStatus, Header, Service, frame};
 use crate::fragment::{
     FIRST_AND_ONLY, Fragment, Kind, Piece, Reassembly, Received, STATUS_OK, STATUS_TOO_MUCH_DATA,
     Sending,
 };
 use crate::identifier::{EXPLICIT_REQUEST, UNCONNECTED_REQUEST, group_2};
 
-/// How long a slave may take to answer. A slave that writes its memory first takes up to 5 s, so
-/// whoever asks for that waits longer.
-pub const ANSWER_TIME: Duration = Duration::from_millis(500);
+/// How long a slave may take to answer over the explicit connection: its expected packet rate, as it
+/// is after an allocation. A slave that writes its memory first takes up to 5 s, so whoever asks for
+/// that waits longer.
+pub const ANSWER_TIME: Duration = Duration::from_millis(2_500);
+
+/// How long it may take on the unconnected port, where the question is whether it is there at all.
+pub(super) const UNCONNECTED_TIME: Duration = Duration::from_millis(500);
 
 /// How long the next fragment of a response may take: the slave repeats one after a second, once.
 const FRAGMENT_TIME: Duration = Duration::from_millis(2_500);
@@ -39,6 +43,16 @@ pub(super) enum Port {
     Unconnected,
     /// Group 2 message 4, over the explicit connection.
     Connected,
+}
+
+impl Port {
+    /// How long a slave may take to answer a request of our own.
+    pub(super) const fn patience(self) -> Duration {
+        match self {
+            Self::Unconnected => UNCONNECTED_TIME,
+            Self::Connected => ANSWER_TIME,
+        }
+    }
 }
 
 /// A request body, and room for what comes back.
@@ -63,12 +77,19 @@ impl<const REQUEST: usize, const RESPONSE: usize> Question<REQUEST, RESPONSE> {
         }
     }
 
-    /// Keeps `body`, at most `REQUEST` octets long.
-    pub(super) fn ask(&mut self, port: Port, body: &[u8], patience: Duration) {
-        for (to, from) in self.body.iter_mut().zip(body) {
-            *to = *from;
+    /// Keeps `body`, written as 8/8, in `format`: at most `REQUEST` octets then.
+    pub(super) fn ask(&mut self, port: Port, format: BodyFormat, body: &[u8], patience: Duration) {
+        let (wide_class, wide_instance) = format.high_octets();
+        let high = |place| (place == 1 && wide_class) || (place == 2 && wide_instance);
+        let octets = body
+            .iter()
+            .enumerate()
+            .flat_map(|(place, octet)| core::iter::once(*octet).chain(high(place).then_some(0)));
+        self.length = 0;
+        for (to, from) in self.body.iter_mut().zip(octets) {
+            *to = from;
+            self.length += 1;
         }
-        self.length = body.len().min(REQUEST) as u8;
         self.port = port;
         self.patience = patience;
         self.response.clear();

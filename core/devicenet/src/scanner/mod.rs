@@ -43,7 +43,7 @@ pub use self::settings::{
 pub use self::view::{CycleTimes, Response, SlaveState, SlaveView, Ticket};
 
 /// How long [`Scanner::set`] lets a slave take to answer: some write their memory first.
-pub const SET_TIME: Duration = Duration::from_secs(2);
+pub const SET_TIME: Duration = Duration::from_secs(3);
 
 /// A DeviceNet scanner for up to `SLAVES` slaves, 64 at most.
 ///
@@ -164,6 +164,41 @@ impl<const SLAVES: usize> Scanner<SLAVES> {
     pub fn remove(&mut self, mac: MacId) -> bool {
         let on_line = self.is_on_line();
         self.change(mac, |slave| slave.remove(on_line)).is_some()
+    }
+
+    /// Begins to poll a slave that runs without: allocates the poll connection besides what it has,
+    /// which stays. Meanwhile it is [configured](SlaveState::Configuring). One that refuses is
+    /// [refused](SlaveState::Refused), and all it has is released. Ask
+    /// [`transmit`](codewheel_station::Station::transmit) afterwards.
+    ///
+    /// # Errors
+    /// [`NotTaken`] says why it cannot be done now; a slave that is polled has [`NotTaken::Busy`].
+    pub fn begin_polling(&mut self, mac: MacId, poll: PollSettings) -> Result<(), NotTaken> {
+        if !self.is_on_line() {
+            return Err(NotTaken::OffLine);
+        }
+        self.change(mac, |slave| match slave.settings.poll {
+            Some(_) => Err(NotTaken::Busy),
+            None => slave.begin_polling(poll),
+        })
+        .unwrap_or(Err(NotTaken::UnknownSlave))
+    }
+
+    /// Ends the polls of a slave: releases the poll connection, and keeps what else there is. Of a
+    /// slave without polls nothing is wanted. Ask
+    /// [`transmit`](codewheel_station::Station::transmit) afterwards.
+    ///
+    /// # Errors
+    /// [`NotTaken`] says why it cannot be done now.
+    pub fn end_polling(&mut self, mac: MacId) -> Result<(), NotTaken> {
+        if !self.is_on_line() {
+            return Err(NotTaken::OffLine);
+        }
+        self.change(mac, |slave| match slave.settings.poll {
+            Some(_) => slave.end_polling(),
+            None => Ok(()),
+        })
+        .unwrap_or(Err(NotTaken::UnknownSlave))
     }
 
     /// The times of the poll cycle.

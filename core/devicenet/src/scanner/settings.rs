@@ -154,6 +154,11 @@ pub enum Refusal {
         /// The code that was wanted.
         wanted: u16,
     },
+    /// It wants class and instance in a form that the scanner does not write.
+    BodyFormat {
+        /// The message body format that it answered the allocation with.
+        format: u8,
+    },
     /// It produces more than a scanner takes.
     InputTooLong {
         /// The size of its production; the scanner takes [`IO_DATA_OCTETS`](super::IO_DATA_OCTETS).

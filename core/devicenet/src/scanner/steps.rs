@@ -13,6 +13,8 @@ const CHANGE: u8 = connection::CHANGE_OF_STATE;
 pub(super) enum Step {
     /// Allocate the explicit and the I/O connections.
     Allocate,
+    /// Allocate the poll connection of a slave that has the explicit one already.
+    AllocatePoll,
     /// Identity attributes 1 and 3, where the settings name them.
     Vendor,
     ProductCode,
@@ -36,8 +38,9 @@ pub(super) enum Step {
 }
 
 /// The steps in their order. The rates come last: until then nothing times out.
-const ORDER: [Step; 12] = [
+const ORDER: [Step; 13] = [
     Step::Allocate,
+    Step::AllocatePoll,
     Step::Vendor,
     Step::ProductCode,
     Step::DeferredDelete,
@@ -70,6 +73,8 @@ impl Step {
         let SlaveSettings { poll, change, identity, .. } = settings;
         match self {
             Self::Allocate => true,
+            // An allocation of everything has brought it; it is a beginning of its own.
+            Self::AllocatePoll => false,
             Self::Vendor | Self::ProductCode => identity.is_some(),
             Self::DeferredDelete => poll.is_some() || change.is_some(),
             Self::PollPath => poll.is_some_and(|poll| poll.assembly.is_some()),
@@ -88,6 +93,7 @@ impl Step {
         let change_assembly = settings.change.and_then(|change| change.assembly);
         match self {
             Self::Allocate => allocate(settings.choice(), master),
+            Self::AllocatePoll => allocate(choice::POLL, master),
             Self::Vendor => get(class::IDENTITY, 1, 1),
             Self::ProductCode => get(class::IDENTITY, 1, 3),
             Self::DeferredDelete => defer_delete(),

@@ -174,11 +174,11 @@ fn a_slave_that_grants_an_absurd_rate_is_not_waited_for_as_long() {
 fn repeats_of_one_attempt_are_not_held_against_the_next() {
     let mut bench = Bench::new(&[Peer::new(5)], &[SlaveSettings::poll(mac(5))]);
     bench.peers[0].rule("0E050207", None);
-    bench.run(secs(2) + millis(700));
+    bench.run(secs(2) + millis(2_700));
     assert_eq!(bench.peer().was_asked("0E050207"), 2);
     bench.scanner.handle(bench.now, Input::BusOff);
     bench.scanner.handle(bench.now, Input::Recovered);
-    bench.run(secs(2) + millis(1_400));
+    bench.run(secs(2) + millis(5_400));
     assert_eq!(bench.peer().was_asked("0E050207"), 2 + 3);
 }
 
@@ -220,8 +220,23 @@ fn an_explicit_connection_alone_is_kept_alive_and_its_loss_is_noticed() {
     let kept = bench.peer().was_asked("0E050101");
     assert!((11..=12).contains(&kept), "{kept} requests in 30 s");
     bench.peer().on = false;
-    bench.run(secs(4));
+    // It is asked twice after 2.5 s, and may take as long to answer.
+    bench.run(millis(7_600));
     assert_eq!((bench.state(), bench.view().losses), (SlaveState::Absent, 1));
+}
+
+#[test]
+fn a_slave_that_is_removed_while_its_allocation_is_under_way_is_released() {
+    let mut peer = Peer::new(5);
+    let mut bench = Bench::new(&[], &[SlaveSettings::explicit(mac(5))]);
+    bench.run(secs(2) + millis(100));
+    assert_eq!(bench.log.last().unwrap().1, "42E#404B03010100");
+    peer.rule("4B0301", None);
+    bench.peers.push(peer);
+    bench.scanner.remove(mac(5));
+    bench.run(millis(10));
+    assert_eq!(bench.peer().asked, ["u4C030101"]);
+    assert!(bench.scanner.slave(mac(5)).is_none());
 }
 
 #[test]

@@ -49,6 +49,20 @@ fn an_answer_that_has_arrived_is_kept_when_the_slave_is_lost_and_found_again() {
 }
 
 #[test]
+fn a_slave_that_takes_700_ms_for_an_answer_is_waited_for() {
+    let mut bench = Bench::running(Peer::new(5), SlaveSettings::explicit(mac(5)));
+    bench.peer().rule("0E6401", None);
+    let ticket =
+        bench.scanner.get(mac(5), Path { class: 0x64, instance: 1, attribute: 2 }).unwrap();
+    bench.run(millis(700));
+    assert_eq!(bench.response(ticket), None);
+    // The transaction bit is that of the request.
+    let header = bench.log.last().unwrap().1[4..6].to_owned();
+    bench.hears(&format!("42B#{header}8E07"));
+    assert_eq!(bench.response(ticket).unwrap(), "07");
+}
+
+#[test]
 fn a_cancelled_request_frees_the_slave_and_its_late_answer_is_dropped() {
     let (mut bench, ticket) = asking();
     assert!(bench.scanner.cancel(ticket));
@@ -220,7 +234,7 @@ fn a_slave_without_deferred_delete_has_its_explicit_connection_kept_alive_by_req
     assert!((11..=13).contains(&kept), "{kept} requests in 30 s");
     // Where it is lost all the same, it is allocated anew while polling goes on.
     bench.peer().rule("0E050101", None);
-    bench.run(secs(4));
+    bench.run(millis(7_700));
     assert_eq!(bench.state(), SlaveState::Running);
     assert!(bench.peer().was_asked("u4B03010100") >= 1);
     assert_eq!(bench.view().losses, 0);

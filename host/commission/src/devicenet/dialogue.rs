@@ -1,10 +1,14 @@
 //! Questions and answers through a seat. Every wait ends.
 
+use std::io;
+
 use codewheel_devicenet::explicit::{Error, Path, Service};
 use codewheel_devicenet::scanner::{
-    ANSWER_TIME, NotAdded, NotTaken, Response, SET_TIME, SlaveSettings, SlaveState, Ticket,
+    ANSWER_TIME, NotAdded, NotTaken, PollSettings, Response, SET_TIME, SlaveSettings, SlaveState,
+    Ticket,
 };
-use codewheel_devicenet::{Fault, MacId};
+use codewheel_devicenet::{Fault, MacId, Scanner};
+use codewheel_link::LinkError;
 use codewheel_station::{Duration, Instant};
 
 use super::console::Console;
@@ -16,6 +20,8 @@ const ON_LINE_TIME: Duration = Duration::from_secs(5);
 /// How long a slave may take to be allocated. One that is checking its own MAC ID is left alone for
 /// 1.1 s first, and one that held connections of an earlier life of ours loses them before.
 const ALLOCATION_TIME: Duration = Duration::from_millis(4_500);
+/// How long one that answers may take to be configured: five answers, each as slow as may be.
+const CONFIGURATION_TIME: Duration = Duration::from_secs(14);
 /// How long releasing a slave may take: four releases, thrice each, where it is gone.
 const RELEASE_TIME: Duration = Duration::from_secs(8);
 /// How long an exchange may take besides the patience for its answer: many fragments, and the
@@ -31,6 +37,11 @@ pub(super) enum Answer {
     Refused(Error),
     /// The response is longer than there is room for.
     TooLong,
+}
+
+/// Whether a turn failed because an end is wanted.
+fn is_interruption(error: &LinkError) -> bool {
+    matches!(error, LinkError::System(error) if error.kind() == io::ErrorKind::Interrupted)
 }
 
 /// A seat, and what people should hear of what happened on its port.
@@ -87,6 +98,9 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
     fn turn(&mut self, tried: &str, until: Instant) -> Result<(), Trouble> {
         match self.seat.turn(until) {
             Ok(notices) => self.notices.extend(notices.iter().map(ToString::to_string)),
+            Err(error) if is_interruption(&error) => {
+                return Err(Trouble::new(Kind::Bus, tried, "an end was wanted before", ""));
+            }
             Err(error) => {
                 let came = format!("the bus is lost: {error}");
                 return Err(Trouble::new(
@@ -214,14 +228,21 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
             }
             None => return Err(troubles::not_on_line(tried)),
         }
-        let outcome = self.wait(tried, ALLOCATION_TIME, |console, _| {
+        self.expect_running(tried, mac).inspect_err(|_| self.abandon(tried, mac))
+    }
+
+    /// Waits until a slave exchanges what it was added for.
+    fn expect_running(&mut self, tried: &str, mac: MacId) -> Result<(), Trouble> {
+        let last_sign = self.now() + ALLOCATION_TIME;
+        let outcome = self.wait(tried, CONFIGURATION_TIME, |console, now| {
             match console.scanner()?.slave(mac)?.state {
-                SlaveState::Running => Some(Ok(())),
-                SlaveState::Refused(refusal) => Some(Err(refusal)),
-                SlaveState::Absent | SlaveState::Configuring => None,
+                SlaveState::Running => Some(Some(Ok(()))),
+                SlaveState::Refused(refusal) => Some(Some(Err(refusal))),
+                SlaveState::Absent => (now >= last_sign).then_some(None),
+                SlaveState::Configuring => None,
             }
         });
-        let trouble = match outcome {
+        Err(match outcome.map(Option::flatten) {
             Ok(Some(Ok(()))) => return Ok(()),
             Ok(Some(Err(refusal))) if troubles::is_ownership(refusal) => {
                 let now = self.now();
@@ -233,10 +254,57 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
             Ok(Some(Err(refusal))) => troubles::not_allocated(tried, refusal),
             Ok(None) => troubles::nobody(tried, mac),
             Err(trouble) => trouble,
-        };
-        // What went wrong before is what people must hear.
-        let _ = self.release(tried, mac);
-        Err(trouble)
+        })
+    }
+
+    /// Has a slave with an explicit connection polled besides. One that refuses keeps the explicit
+    /// connection alone.
+    pub(super) fn begin_polling(
+        &mut self,
+        tried: &str,
+        mac: MacId,
+        poll: PollSettings,
+    ) -> Result<(), Trouble> {
+        self.change_polling(tried, mac, |scanner| match scanner.begin_polling(mac, poll) {
+            // It is polled: an end was wanted while that began.
+            Err(NotTaken::Busy) => Ok(()),
+            result => result,
+        })?;
+        let begun = self.expect_running(tried, mac);
+        if begun.as_ref().is_err_and(|trouble| trouble.kind != Kind::Bus) {
+            let _ = self.release(tried, mac);
+            let _ = self.allocate(tried, SlaveSettings::explicit(mac));
+        }
+        begun
+    }
+
+    /// Ends the polls of a slave, which keeps its explicit connection.
+    pub(super) fn end_polling(&mut self, tried: &str, mac: MacId) -> Result<(), Trouble> {
+        self.change_polling(tried, mac, |scanner| scanner.end_polling(mac))?;
+        self.expect_running(tried, mac)
+    }
+
+    fn change_polling(
+        &mut self,
+        tried: &str,
+        mac: MacId,
+        mut change: impl FnMut(&mut Scanner) -> Result<(), NotTaken>,
+    ) -> Result<(), Trouble> {
+        let changed = self.wait(tried, ALLOCATION_TIME, |console, _| {
+            let Some(scanner) = console.scanner_mut() else { return Some(Err(NotTaken::OffLine)) };
+            match change(scanner) {
+                // It was lost and is being brought back.
+                Err(NotTaken::NotRunning | NotTaken::OffLine) if scanner.faulted().is_none() => {
+                    None
+                }
+                result => Some(result),
+            }
+        })?;
+        match changed {
+            Some(Ok(())) => Ok(()),
+            Some(Err(NotTaken::UnknownSlave)) => Err(troubles::not_open(tried, mac)),
+            Some(Err(_)) | None => Err(self.no_answer(tried, mac)),
+        }
     }
 
     fn add(&mut self, settings: SlaveSettings) -> Option<Result<(), NotAdded>> {
@@ -253,6 +321,18 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
             scanner.is_none_or(|scanner| scanner.slave(mac).is_none()).then_some(())
         })?;
         gone.ok_or_else(|| troubles::gone(tried, mac))
+    }
+
+    /// Releases the slave after something went wrong, which is what people must hear; an end that
+    /// somebody wants waits for it.
+    pub(super) fn abandon(&mut self, tried: &str, mac: MacId) {
+        self.wind_up();
+        let _ = self.release(tried, mac);
+    }
+
+    /// What follows undoes what was begun, though an end is wanted.
+    pub(super) fn wind_up(&mut self) {
+        self.seat.wind_up();
     }
 
     /// Asks the explicit request `body` of a slave that was allocated.
@@ -310,12 +390,7 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
                 format!("a request of {} octets is longer than 64", body.len()),
                 "give fewer octets",
             )),
-            Some(Err(NotTaken::UnknownSlave)) => Err(Trouble::new(
-                Kind::Usage,
-                tried,
-                format!("there is no connection to the device at MAC ID {mac} any more"),
-                "open it anew",
-            )),
+            Some(Err(NotTaken::UnknownSlave)) => Err(troubles::not_open(tried, mac)),
             Some(Err(_)) | None => Err(self.no_answer(tried, mac)),
         }
     }

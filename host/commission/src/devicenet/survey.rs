@@ -191,6 +191,14 @@ fn look_at<S: Seat<Station = Console>>(
     let asked = dialogue
         .allocate(&tried, SlaveSettings::explicit(mac))
         .and_then(|()| identity::identify(dialogue, &tried, mac));
+    if asked.is_err() {
+        dialogue.wind_up();
+    }
+    // Whatever has come of it: a node that went away meanwhile is no reason to stop.
+    let released = match dialogue.release(&tried, mac) {
+        Err(trouble) if trouble.kind == Kind::Bus => Err(trouble),
+        _ => Ok(()),
+    };
     match asked {
         Ok(known) => {
             node.role = Role::Slave;
@@ -199,11 +207,7 @@ fn look_at<S: Seat<Station = Console>>(
             node.state = state_of_free(known.status);
             node.identity = Some(known.identity);
         }
-        Err(trouble) if trouble.kind == Kind::Bus => {
-            // What went wrong before is what people must hear.
-            let _ = dialogue.release(&tried, mac);
-            return Err(trouble);
-        }
+        Err(trouble) if trouble.kind == Kind::Bus => return Err(trouble),
         Err(trouble) if trouble.kind == Kind::Refused => {
             node.role = Role::Slave;
             let master = dialogue.console().overheard().node(mac).master;
@@ -213,11 +217,7 @@ fn look_at<S: Seat<Station = Console>>(
         }
         Err(_) => node.state = "is on-line, and does not take an explicit connection".to_owned(),
     }
-    // A node that went away meanwhile is no reason to stop.
-    match dialogue.release(&tried, mac) {
-        Err(trouble) if trouble.kind == Kind::Bus => Err(trouble),
-        _ => Ok(node),
-    }
+    released.map(|()| node)
 }
 
 /// What was overheard of a node.

@@ -80,6 +80,16 @@ pub(super) fn gone(tried: &str, mac: MacId) -> Trouble {
     )
 }
 
+/// There is no connection to a device.
+pub(super) fn not_open(tried: &str, mac: MacId) -> Trouble {
+    Trouble::new(
+        Kind::Usage,
+        tried,
+        format!("there is no connection to the device at MAC ID {mac} any more"),
+        "open it anew",
+    )
+}
+
 /// A slave belongs to another master.
 pub(super) fn owned(tried: &str, mac: MacId, owner: Owner, candidates: &[MacId]) -> Trouble {
     let (came, whom) = match owner {
@@ -120,6 +130,10 @@ pub(super) fn not_allocated(tried: &str, refusal: Refusal) -> Trouble {
         Refusal::AnotherDevice { found, wanted, .. } => (
             format!("it is another device: {found} instead of {wanted}"),
             "see with a scan which device has this address",
+        ),
+        Refusal::BodyFormat { format } => (
+            format!("it wants requests in message body format {format}, which nobody here writes"),
+            "read it with the tool of its maker",
         ),
         Refusal::InputTooLong { octets } => (
             format!("it produces {octets} octets, more than there is room for"),

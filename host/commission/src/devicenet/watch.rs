@@ -3,7 +3,7 @@
 
 use codewheel_devicenet::MacId;
 use codewheel_devicenet::explicit::{Path, class};
-use codewheel_devicenet::scanner::SlaveSettings;
+use codewheel_devicenet::scanner::PollSettings;
 use codewheel_station::{Duration, Instant};
 
 use super::console::Console;
@@ -14,6 +14,8 @@ use crate::{Sample, Seat, Trouble};
 
 /// How long a position may take: the scanner gives a slave up after 800 ms, and brings it back.
 const PATIENCE: Duration = Duration::from_secs(6);
+/// How the encoder is polled.
+const POLL: PollSettings = PollSettings { expected_packet_rate: 200, assembly: None };
 /// How old flags may become that polls do not bring.
 const FLAGS_AGE: Duration = Duration::from_millis(500);
 /// The assembly of position and flags, and its data.
@@ -31,7 +33,8 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// Allocates the poll connection in place of the explicit one alone.
+    /// Allocates the poll connection besides the explicit one, which stays: a slave that was released
+    /// in between could be taken by another master.
     ///
     /// Which assembly is polled stays as the device has kept it: to choose the one with flags would
     /// write its memory.
@@ -40,8 +43,7 @@ impl Watch {
         tried: &str,
         mac: MacId,
     ) -> Result<Self, Trouble> {
-        dialogue.release(tried, mac)?;
-        dialogue.allocate(tried, SlaveSettings::poll(mac))?;
+        dialogue.begin_polling(tried, mac, POLL)?;
         Ok(Self { seen: None, changed: None, flags: None })
     }
 
@@ -51,8 +53,7 @@ impl Watch {
         tried: &str,
         mac: MacId,
     ) -> Result<(), Trouble> {
-        dialogue.release(tried, mac)?;
-        dialogue.allocate(tried, SlaveSettings::explicit(mac))
+        dialogue.end_polling(tried, mac)
     }
 
     /// Something was changed until `now`: positions that came before are not given any more.

@@ -25,6 +25,14 @@ const PATIENCE_BITS: u32 = 50_000;
 const WATCHDOG: Duration = Duration::from_secs(5);
 /// How many stations are asked with one token by a master alone.
 const IN_A_ROW: u8 = 8;
+/// How long it is listened at least for a token where masters ask and none was heard yet: who serves
+/// many slaves, or goes through them several times with one token, hands it on late.
+const TOKEN: Duration = Duration::from_secs(5);
+const TOKEN_BITS: u32 = 100_000;
+/// How long a slave that exchanges data may say nothing until it counts as gone, besides some cycles.
+const SILENCE: Duration = Duration::from_millis(1_900);
+const SILENCE_BITS: u32 = 20_000;
+const SILENT_CYCLES: u64 = 4;
 /// A token on the line.
 const TOKEN_CHARACTERS: u32 = 3;
 /// How often progress is told while nothing happens.
@@ -62,6 +70,14 @@ impl<S: Seat<Station = Console>> Conversation<S> {
     pub(super) fn patience(&mut self) -> Instant {
         let rate = self.rate();
         self.seat.now() + PATIENCE + rate.bits(PATIENCE_BITS)
+    }
+
+    /// Until when a slave that exchanged data up to now, once in a `cycle`, may say nothing: 2 s and
+    /// four cycles from 187.5k on, 4 s at 9.6k.
+    pub(super) fn silence(&mut self, cycle: Duration) -> Instant {
+        let rate = self.rate();
+        let cycles = cycle.as_nanos().saturating_mul(SILENT_CYCLES);
+        self.seat.now() + SILENCE + rate.bits(SILENCE_BITS) + Duration::from_nanos(cycles)
     }
 
     pub(super) fn take_notices(&mut self) -> Vec<String> {
@@ -120,6 +136,78 @@ impl<S: Seat<Station = Console>> Conversation<S> {
         masters.filter(is_there).map(|(address, _)| address).collect()
     }
 
+    /// Listens on where masters ask and none has handed on a token yet. Whoever looks for other masters
+    /// has one, and is listened to for as long as the ring may take to admit another.
+    ///
+    /// A master that holds its token longer than that, or says nothing while it is listened, is not
+    /// known as one of a ring: nobody joins it, which is the safe side.
+    pub(super) fn listen_for_a_token(
+        &mut self,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<(), Trouble> {
+        let rate = self.rate();
+        let mut percent_told = None;
+        while !self.masters().is_empty() && !self.is_ring_heard() {
+            let limit = if self.is_master_sought() {
+                ADMISSION + rate.bits(ADMISSION_BITS)
+            } else {
+                TOKEN + rate.bits(TOKEN_BITS)
+            };
+            let (now, end) = (self.seat.now(), self.since + limit);
+            if now >= end {
+                break;
+            }
+            let percent = percent(now.since(self.since).as_nanos(), limit.as_nanos());
+            if percent_told.replace(percent) != Some(percent) {
+                progress(Progress { doing: "listening for a token".to_owned(), percent });
+            }
+            self.wait(end.min(now + STEP), |_, _| None::<()>)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a master that was heard since it listens hands on a token.
+    pub(super) fn is_ring_heard(&mut self) -> bool {
+        self.is_any_master(HeardMaster::is_in_ring)
+    }
+
+    /// Whether a master that was heard since it listens looks for others.
+    fn is_master_sought(&mut self) -> bool {
+        self.is_any_master(|master| master.searches > 0)
+    }
+
+    fn is_any_master(&mut self, is_so: impl Fn(&HeardMaster) -> bool) -> bool {
+        let there = self.masters();
+        let overheard = self.console().overheard();
+        overheard.masters().any(|(address, master)| there.contains(&address) && is_so(master))
+    }
+
+    /// The masters that were heard, in words: `master 2 is on the bus`.
+    pub(super) fn masters_in_words(&mut self) -> String {
+        match self.masters().as_slice() {
+            [one] => format!("master {one} is on the bus"),
+            others => format!("masters {} are on the bus", list(others)),
+        }
+    }
+
+    /// What is said where masters ask and no token goes round.
+    pub(super) fn no_token(&mut self) -> String {
+        let tenths = self.seat.now().since(self.since).as_nanos() / 100_000_000;
+        format!("no token was heard in {}.{} s", tenths / 10, tenths % 10)
+    }
+
+    /// Why nobody can take turns with the masters that were heard; `None` where a token goes round, or
+    /// no master is there.
+    pub(super) fn ring_trouble(&mut self, tried: &str) -> Option<Trouble> {
+        if self.masters().is_empty() || self.is_ring_heard() {
+            return None;
+        }
+        let came = format!("{}, and {}", self.masters_in_words(), self.no_token());
+        let remedy = "nobody can take turns where no token goes round: listen alone, or take that \
+                      master off the bus";
+        Some(Trouble::new(Kind::Bus, tried, came, remedy))
+    }
+
     /// Why the own address cannot be used, after listening.
     pub(super) fn address_trouble(&mut self, tried: &str) -> Option<Trouble> {
         let own = self.settings.address;
@@ -174,18 +262,20 @@ impl<S: Seat<Station = Console>> Conversation<S> {
             console.master().is_some_and(Master::is_in_ring).then_some(())
         };
         let is_in = self.wait(until, is_in);
-        if is_in.is_err() {
-            // What went wrong before is the one to hear of.
-            let _ = self.leave();
+        if !matches!(is_in, Ok(Some(()))) {
+            self.abandon();
         }
         if is_in?.is_none() {
-            self.leave()?;
             let came = match others.as_slice() {
                 [] => "the bus is never silent, and no master hands the token on".to_owned(),
                 [one] => format!("master {one} does not admit master {own} to its ring"),
                 _ => format!("masters {} do not admit master {own} to their ring", list(&others)),
             };
-            let remedy = "give this master a lower address: others are looked for below HSA alone";
+            let remedy = if own == 0 {
+                "it may look for others rarely or not at all: see its HSA and its GAP factor"
+            } else {
+                "give this master a lower address: others are looked for below HSA alone"
+            };
             return Err(Trouble::new(Kind::TimeOut, tried, came, remedy));
         }
         if others.is_empty()
@@ -213,6 +303,12 @@ impl<S: Seat<Station = Console>> Conversation<S> {
             (answered.address == address && answered.request == request).then_some(answered.answer)
         })?;
         Ok(answer.unwrap_or(Answer::Silence))
+    }
+
+    /// Leaves the bus, whatever went wrong before: that is what there is to hear of.
+    pub(super) fn abandon(&mut self) {
+        self.seat.wind_up();
+        let _ = self.leave();
     }
 
     /// Hands the token on and falls silent, once the token is out.

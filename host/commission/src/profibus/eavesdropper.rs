@@ -4,7 +4,7 @@ use codewheel_station::Instant;
 
 use super::conversation::{Conversation, list};
 use super::identity::Told;
-use super::{Console, HeardSlave, ScanSettings};
+use super::{Console, CycleTimes, HeardSlave, Overheard, ScanSettings};
 use crate::{Identity, Kind, Progress, Sample, Seat, Trouble};
 
 /// Watches the exchange of data of one slave with its master, and sends nothing, ever.
@@ -60,7 +60,8 @@ impl<S: Seat<Station = Console>> Eavesdropper<S> {
     /// [`Trouble`]: none comes any more.
     pub fn sample(&mut self) -> Result<Sample, Trouble> {
         let (address, last) = (self.address, self.last);
-        let until = self.conversation.patience();
+        let cycles = cycles(self.conversation.console().overheard(), address);
+        let until = self.conversation.silence(cycles.mean());
         let newer = |console: &mut Console, _| {
             let slave = console.overheard().slave(address)?;
             sample_of(slave).filter(|sample| sample.at > last)
@@ -94,6 +95,12 @@ pub(super) fn sample_of(slave: &HeardSlave) -> Option<Sample> {
         warning: told.and_then(Told::warning),
         cycle: (exchange.cycle.count > 0).then(|| exchange.cycle.last.as_nanos()),
     })
+}
+
+/// The cycle in which a slave is asked that somebody else serves; nothing before it was asked twice.
+pub(super) fn cycles(overheard: &Overheard, address: u8) -> CycleTimes {
+    let exchange = overheard.slave(address).and_then(|slave| slave.exchange.as_ref());
+    exchange.map(|exchange| exchange.cycle).unwrap_or_default()
 }
 
 /// The position in two or four octets, the high one first; of two it is the low word.

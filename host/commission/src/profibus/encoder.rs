@@ -9,12 +9,12 @@ use codewheel_encoder::Model;
 use codewheel_station::Instant;
 
 use super::chosen::{Chosen, number_for};
-use super::conversation::{Conversation, list};
+use super::conversation::Conversation;
 use super::identity::Told;
 use super::{
     Acyclic, Answer, Console, Diagnosis, Event, HIGHEST_ADDRESS, ScanSettings, SlaveState,
 };
-use crate::{Kind, Progress, Reading, Seat, Trouble};
+use crate::{Kind, Progress, Reading, Seat, Session, Trouble};
 
 /// How a session is opened.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -105,15 +105,15 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         let overrides = overrides(&tried, &settings.parameters)?;
         let mut conversation = Conversation::new(seat, settings.master);
         conversation.listen(progress)?;
-        may_speak(&mut conversation, &tried, address)?;
+        may_speak(&mut conversation, &tried, address, progress)?;
         conversation.join(&tried)?;
         let mut session =
             Self { conversation, address, standing: Standing::Foreign, sampled: Instant::ZERO };
         let opened = session.begin(&tried, settings, &overrides);
         if opened.is_err() {
+            session.conversation.seat.wind_up();
             // What went wrong before is the one to hear of.
-            let _ = session.let_go(&tried);
-            let _ = session.conversation.leave();
+            let _ = session.release();
         }
         opened.map(|()| session)
     }
@@ -147,11 +147,10 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         let [_, two_words_and_preset, ..] = &configuration::ROWS;
         let configuration = settings.configuration.unwrap_or(two_words_and_preset);
         let served = Served { chosen, configuration, model, data_sheet: product.data_sheet };
+        // It may be locked as soon as parameters are on their way.
+        self.standing = Standing::Served(served);
         match self.bring_up(&served)? {
-            BroughtUp::ExchangesData => {
-                self.standing = Standing::Served(served);
-                Ok(())
-            }
+            BroughtUp::ExchangesData => Ok(()),
             BroughtUp::RefusedParameters => {
                 let given =
                     overrides.iter().map(|(row, value)| refused_remedy(&served, row, *value));
@@ -159,7 +158,13 @@ impl<S: Seat<Station = Console>> Encoder<S> {
                 let came = "it refuses its parameters (Prm_Fault)";
                 Err(Trouble::new(Kind::Refused, tried, came, remedy))
             }
-            other => Err(self.bring_up_trouble(tried, other)),
+            other => {
+                if other == BroughtUp::BelongsToAnother {
+                    // Then it is not for us to release it.
+                    self.standing = Standing::Foreign;
+                }
+                Err(self.bring_up_trouble(tried, other))
+            }
         }
     }
 
@@ -263,18 +268,6 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         Ok(exchanges.unwrap_or(BroughtUp::Silent))
     }
 
-    /// Ends the service of the slave, if it is served, and unlocks it for its own master.
-    fn let_go(&mut self, tried: &str) -> Result<(), Trouble> {
-        let address = self.address;
-        let Some(master) = self.conversation.console().master_mut() else { return Ok(()) };
-        let is_served = master.slave(address).is_some();
-        master.stop();
-        if is_served {
-            self.conversation.ask(tried, address, Acyclic::Unlock)?;
-        }
-        Ok(())
-    }
-
     /// Makes notices of what the master tells.
     fn take_events(&mut self) {
         while let Some(event) =
@@ -292,23 +285,29 @@ fn may_speak<S: Seat<Station = Console>>(
     conversation: &mut Conversation<S>,
     tried: &str,
     address: u8,
+    progress: &mut dyn FnMut(Progress),
 ) -> Result<(), Trouble> {
     if let Some(trouble) = conversation.gibberish_trouble(tried) {
         return Err(trouble);
     }
+    conversation.listen_for_a_token(progress)?;
     let masters = conversation.masters();
     if !masters.is_empty() && !conversation.settings.join {
-        let are = match masters.as_slice() {
-            [one] => format!("master {one} is on the bus"),
-            _ => format!("masters {} are on the bus", list(&masters)),
-        };
+        let are = conversation.masters_in_words();
         let heard = conversation.console().overheard().slave(address);
         let came = match heard.and_then(|slave| slave.exchange.as_ref()) {
             Some(exchange) => format!("{are}, and {} exchanges data with it", exchange.master),
             None => are,
         };
-        let remedy = "watch without a word, or take turns with the others: join the ring (--join)";
+        let remedy = if conversation.is_ring_heard() {
+            "watch without a word, or take turns with the others: join the ring (--join)".to_owned()
+        } else {
+            format!("watch without a word: {}, so nobody can take turns", conversation.no_token())
+        };
         return Err(Trouble::new(Kind::Bus, tried, came, remedy));
+    }
+    if let Some(trouble) = conversation.ring_trouble(tried) {
+        return Err(trouble);
     }
     match conversation.address_trouble(tried) {
         Some(trouble) => Err(trouble),

@@ -12,6 +12,10 @@ use super::settings::HIGHEST_ADDRESS;
 use super::telegram::Receiver;
 use super::{CycleTimes, Diagnosis, LONGEST_SLOT, StationKind};
 
+/// How many octets are enough to say that none makes a telegram: more than the end of one that began
+/// before it was listened to.
+const GIBBERISH: u64 = 16;
+
 /// Noise may look like a token once or twice; a master alone with its token sends nothing else.
 const CERTAIN_TOKENS: u64 = 3;
 
@@ -24,9 +28,21 @@ pub struct HeardMaster {
     pub rotation: CycleTimes,
     /// How often it asked somebody.
     pub requests: u64,
+    /// How often it looked for a station where none was heard, by its FDL status: other masters (GAP),
+    /// or a slave that is not there.
+    pub searches: u64,
     /// When it was heard last.
     pub at: Instant,
     token_at: Option<Instant>,
+}
+
+impl HeardMaster {
+    /// Whether it hands on a token. Of a master that says nothing else it takes a few of them, since
+    /// noise may look like one.
+    #[must_use]
+    pub const fn is_in_ring(&self) -> bool {
+        self.tokens >= CERTAIN_TOKENS || (self.tokens > 0 && self.requests > 0)
+    }
 }
 
 /// Parameters or a configuration on their way to a slave.
@@ -138,7 +154,7 @@ impl Overheard {
     /// rate, or its two lines are crossed.
     #[must_use]
     pub fn is_gibberish(&self) -> bool {
-        self.octets > 0 && self.telegrams == 0 && self.masters().next().is_none()
+        self.octets >= GIBBERISH && self.telegrams == 0 && self.masters().next().is_none()
     }
 
     /// Octets heard, the broken ones among them.
@@ -218,10 +234,13 @@ impl Overheard {
     fn request(&mut self, now: Instant, data: &Data<'_>) {
         let (from, to) = (data.source(), data.destination());
         self.asked = None;
+        let function = data.function_code().function();
+        let searches = function == Some(Function::FdlStatus) && !self.slaves.contains_key(&to);
         if let Some(master) = self.master(now, from) {
             master.requests += 1;
+            master.searches += u64::from(searches);
         }
-        let what = match data.function_code().function() {
+        let what = match function {
             Some(Function::FdlStatus) => What::FdlStatus,
             Some(Function::SrdLow | Function::SrdHigh) => match data.saps() {
                 Ok(None) => What::DataExchange,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use codewheel_device::product::Bus;
 use codewheel_station::Duration;
 
-use super::conversation::{Conversation, gibberish, list, percent};
+use super::conversation::{Conversation, gibberish, percent};
 use super::identity::Told;
 use super::{
     Acyclic, Answer, Answered, Console, Diagnosis, HIGHEST_ADDRESS, HeardSlave, Overheard,
@@ -40,8 +40,14 @@ impl Default for ScanSettings {
 /// it asks every address for its FDL status and every slave for its diagnosis, which disturbs no
 /// exchange of data, and is gone again from the ring.
 ///
+/// Where masters ask and none hands on a token, it listens for 5 s and 100 000 bits, 15 s at 9.6k; 10 s
+/// and 400 000 bits where one looks for others. A master without token cannot be joined: its pauses
+/// are no lost token. One that holds its token longer, or says nothing for a second, is not known for
+/// what it is; listen longer before, where there may be such.
+///
 /// # Errors
-/// [`Trouble`]: the bus is lost, the own address is taken, or the ring does not admit another master.
+/// [`Trouble`]: the bus is lost, the own address is taken, no token goes round that could be shared, or
+/// the ring does not admit another master.
 pub fn scan(
     seat: &mut impl Seat<Station = Console>,
     settings: ScanSettings,
@@ -49,6 +55,7 @@ pub fn scan(
 ) -> Result<Survey, Trouble> {
     let mut conversation = Conversation::new(seat, settings);
     conversation.listen(progress)?;
+    conversation.listen_for_a_token(progress)?;
     let mut remarks = Vec::new();
     let mut asked = BTreeMap::new();
     let masters = conversation.masters();
@@ -67,14 +74,14 @@ pub fn scan(
         ));
     }
     if !masters.is_empty() && !settings.join {
-        let (are, they) = match masters.as_slice() {
-            [one] => (format!("master {one} is"), "it"),
-            _ => (format!("masters {} are", list(&masters)), "them"),
+        let are = conversation.masters_in_words();
+        let they = if masters.len() == 1 { "it" } else { "them" };
+        let further = if conversation.is_ring_heard() {
+            format!("to take turns with {they} and ask every address, join the ring (--join)")
+        } else {
+            format!("{}, so nobody can take turns with {they}", conversation.no_token())
         };
-        remarks.push(format!(
-            "{are} on the bus, so nothing was asked: this is what was overheard; to take turns with \
-             {they} and ask every address, join the ring (--join)"
-        ));
+        remarks.push(format!("{are}, so nothing was asked: this is what was overheard; {further}"));
     } else if !is_gibberish {
         asked = ask_all(&mut conversation, progress)?;
         let console = conversation.console();
@@ -88,6 +95,9 @@ pub fn scan(
     let nodes = nodes(conversation.console().overheard(), &asked, settings.address);
     Ok(Survey { bus: Bus::Profibus, nodes, remarks })
 }
+
+/// How often in a scan a slave that has just answered is asked for its diagnosis again.
+const AGAIN: u32 = 32;
 
 /// What a station said when it was asked.
 #[derive(Clone, Debug)]
@@ -105,25 +115,23 @@ fn ask_all<S: Seat<Station = Console>>(
     if let Some(trouble) = conversation.address_trouble(tried) {
         return Err(trouble);
     }
-    conversation.join(tried)?;
-    let asked = ask_each(conversation, progress);
-    let left = conversation.leave();
-    let (all, done, open) = asked?;
-    left?;
-    if done == open {
-        return Ok(all);
+    if let Some(trouble) = conversation.ring_trouble(tried) {
+        return Err(trouble);
     }
-    let came = format!("the token did not come back after {done} of {open} requests");
-    let remedy = "try again; on a busy line try another master address";
-    Err(Trouble::new(Kind::TimeOut, tried, came, remedy))
+    conversation.join(tried)?;
+    let asked = ask_in_ring(conversation, tried, progress);
+    if asked.is_err() {
+        conversation.abandon();
+    }
+    asked
 }
 
-/// Asks every address while it has the token; what they said, and how many of how many requests were
-/// answered or given up.
-fn ask_each<S: Seat<Station = Console>>(
+/// Asks every address as a member of the ring, and leaves it.
+fn ask_in_ring<S: Seat<Station = Console>>(
     conversation: &mut Conversation<S>,
+    tried: &str,
     progress: &mut dyn FnMut(Progress),
-) -> Result<(BTreeMap<u8, Said>, u64, u64), Trouble> {
+) -> Result<BTreeMap<u8, Said>, Trouble> {
     let own = conversation.settings.address;
     let addresses = (0..=HIGHEST_ADDRESS).filter(|address| *address != own);
     let mut open = 0;
@@ -133,15 +141,22 @@ fn ask_each<S: Seat<Station = Console>>(
             open += u64::from(master.ask(address, Acyclic::FdlStatus).is_ok());
         }
     }
-    let mut done = 0;
+    let (mut done, mut again) = (0, AGAIN);
     let mut all: BTreeMap<u8, Said> = BTreeMap::new();
     while done < open {
         let until = conversation.patience();
         let answer = |console: &mut Console, _| console.master_mut()?.take_answer();
         let Some(answered) = conversation.wait(until, answer)? else { break };
         done += 1;
-        let Answered { address, answer, .. } = answered;
+        let Answered { address, request, answer } = answered;
         match answer {
+            // It was there a moment ago: on a PC that is busy an answer may come after its slot.
+            Answer::Silence if request == Acyclic::Diagnosis && again > 0 => {
+                again -= 1;
+                if let Some(master) = conversation.console().master_mut() {
+                    open += u64::from(master.ask(address, request).is_ok());
+                }
+            }
             Answer::Station(kind) => {
                 all.insert(address, Said { kind, diagnosis: None });
                 if kind == StationKind::Slave
@@ -162,7 +177,14 @@ fn ask_each<S: Seat<Station = Console>>(
             percent: percent(done, open),
         });
     }
-    Ok((all, done, open))
+    let is_whole = done == open;
+    conversation.leave()?;
+    if is_whole {
+        return Ok(all);
+    }
+    let came = format!("the token did not come back after {done} of {open} requests");
+    let remedy = "try again; on a busy line try another master address";
+    Err(Trouble::new(Kind::TimeOut, tried, came, remedy))
 }
 
 /// Everybody who was heard, or answered.
@@ -182,6 +204,7 @@ fn nodes(overheard: &Overheard, asked: &BTreeMap<u8, Said>, own: u8) -> Vec<Foun
     for (address, master) in overheard.masters() {
         let rotation = master.rotation;
         let state = match (master.tokens, rotation.count) {
+            (0, _) if master.searches > 0 => "looks for others, no token was heard".to_owned(),
             (0, _) => "asks without a token".to_owned(),
             (_, 0) => "in the ring".to_owned(),
             _ => format!(

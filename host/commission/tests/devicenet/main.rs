@@ -1,6 +1,7 @@
 //! Commissioning on a DeviceNet segment in virtual time: real encoders, other people's masters, and
 //! all that can go wrong.
 
+mod interruptions;
 mod liar;
 mod listening;
 mod other_devices;

@@ -127,9 +127,8 @@ fn a_session_goes_on_after_the_device_was_switched_off_and_on() {
     while session.now() < end {
         troubles.extend(session.value(&key("position")).err());
     }
-    // Some question or two found nobody; then it was there again.
-    assert!((1..5).contains(&troubles.len()), "{troubles:?}");
-    assert!(troubles.iter().all(|trouble| trouble.kind == Kind::TimeOut), "{troubles:?}");
+    // The question of that moment waits until it is there again, and is asked anew then.
+    assert_eq!(troubles, []);
     assert_eq!(number(&mut session, "steps-per-turn"), 8_192);
 }
 

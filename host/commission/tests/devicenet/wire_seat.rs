@@ -1,6 +1,8 @@
 //! A seat on a wire in virtual time, with whatever else the test attaches.
 
-use std::fmt;
+use std::cell::Cell;
+use std::rc::Rc;
+use std::{fmt, io};
 
 use codewheel_commission::devicenet::{Console, Encoder, OpenSettings};
 use codewheel_commission::{Progress, Reading, Seat, Session, Trouble};
@@ -11,7 +13,7 @@ use codewheel_encoder::Start;
 use codewheel_link::{LinkError, Notice};
 use codewheel_sim::can::{Event, NodeId, Wire};
 use codewheel_sim::{Either, shaft::Shaft};
-use codewheel_station::can::{BitRate, Filter, Frame};
+use codewheel_station::can::{BitRate, Filter, Frame, Identifier};
 use codewheel_station::{Duration, Instant};
 
 use crate::liar::Liar;
@@ -44,10 +46,8 @@ pub(crate) struct WireSeat {
     pub(crate) frames: Vec<(Instant, NodeId, Frame)>,
     /// Whether the port says that it is lost for good.
     pub(crate) is_lost: bool,
-    /// Whether the next turn fails because a person wants an end.
-    is_interrupted: bool,
-    /// So many frames after this address was allocated it does.
-    interruption: Option<(u8, usize)>,
+    /// After how many turns somebody wants an end, until it is wound up.
+    pub(crate) turns_left: Rc<Cell<Option<u32>>>,
     /// Whether the memories of encoders take what they are given, and how long that lasts.
     pub(crate) has_memory: bool,
     pub(crate) memory_time: Duration,
@@ -64,8 +64,7 @@ impl WireSeat {
             console,
             frames: Vec::new(),
             is_lost: false,
-            is_interrupted: false,
-            interruption: None,
+            turns_left: Rc::default(),
             has_memory: true,
             memory_time: Duration::ZERO,
             agenda: Vec::new(),
@@ -136,25 +135,6 @@ impl WireSeat {
         self.agenda.insert(place, (at, Box::new(act)));
     }
 
-    /// Has a person want an end so many frames after the encoder at `address` was allocated.
-    pub(crate) fn interrupt_after_allocation(&mut self, address: u8, frames: usize) {
-        self.interruption = Some((address, frames));
-    }
-
-    fn interrupt(&mut self) {
-        let Some((address, frames)) = self.interruption else { return };
-        let answers = format!("{:03X}#", 0x400 | u16::from(address) << 3 | 3);
-        let place = self.frames.iter().position(|(_, _, frame)| {
-            let frame = frame.to_string();
-            // CB: the response to Allocate.
-            frame.starts_with(&answers) && frame.get(6..8) == Some("CB")
-        });
-        if place.is_some_and(|place| self.frames.len() > place + frames) {
-            self.is_interrupted = true;
-            self.interruption = None;
-        }
-    }
-
     /// Lets `span` pass.
     pub(crate) fn run(&mut self, span: Duration) {
         let until = self.wire.now() + span;
@@ -212,6 +192,22 @@ impl WireSeat {
         ours.map(|(_, _, frame)| frame.to_string()).collect()
     }
 
+    /// Which of our allocations at `address` were taken and not released since, by the frames.
+    pub(crate) fn held(&self, address: u16) -> u8 {
+        let (mut wanted, mut held) = (0, 0);
+        for (_, _, frame) in &self.frames {
+            let Identifier::Standard(bits) = frame.identifier() else { continue };
+            let own = 0x400 | address << 3;
+            match (bits ^ own, frame.data()) {
+                (4 | 6, [_, 0x4B | 0x4C, 3, 1, choice, ..]) => wanted = *choice,
+                (3, [_, 0xCB, ..]) => held |= wanted,
+                (3, [_, 0xCC]) => held &= !wanted,
+                _ => {}
+            }
+        }
+        held
+    }
+
     /// Opens the device at `address`.
     pub(crate) fn open(&mut self, address: u8) -> Result<Encoder<&mut Self>, Trouble> {
         Encoder::open(self, mac(address), OpenSettings::default())
@@ -240,12 +236,18 @@ impl Seat for WireSeat {
             let reason = "the other side closed it".to_owned();
             return Err(LinkError::Lost { bus: "slcan:127.0.0.1:4001".to_owned(), reason });
         }
-        self.interrupt();
-        if std::mem::take(&mut self.is_interrupted) {
-            return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
+        match self.turns_left.get() {
+            Some(0) => return Err(LinkError::System(io::ErrorKind::Interrupted.into())),
+            turns => self.turns_left.set(turns.map(|turns| turns - 1)),
         }
         self.step(until);
         Ok(Vec::new())
+    }
+
+    fn wind_up(&mut self) {
+        if self.turns_left.get() == Some(0) {
+            self.turns_left.set(None);
+        }
     }
 }
 

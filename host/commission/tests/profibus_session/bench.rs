@@ -17,6 +17,7 @@ use codewheel_sim::shaft::Shaft;
 use codewheel_station::rs485::{BaudRate, Node};
 use codewheel_station::{Duration, Instant};
 
+use crate::speaker::Speaker;
 use crate::stranger::Stranger;
 
 pub(crate) const RATE: BaudRate = BaudRate::Mbit1_5;
@@ -40,7 +41,7 @@ impl Sensor for Disc {
         self.0.as_ref()?.changes_at(now)
     }
 }
-type Station = Either<Either<Console, Master>, Either<Device, Stranger>>;
+type Station = Either<Either<Console, Master>, Either<Device, Either<Stranger, Speaker>>>;
 
 /// A console on a wire.
 pub(crate) struct Bench {
@@ -52,10 +53,13 @@ pub(crate) struct Bench {
     pub(crate) complaints: Vec<String>,
     /// Telegrams of the console.
     pub(crate) said: u64,
-    /// How many telegrams of the console a person lets pass before they want an end.
-    pub(crate) patience: Option<u64>,
+    /// What the console sent as outputs to whom, each once in a row.
+    pub(crate) outputs: Vec<Vec<u8>>,
     /// Who is unplugged, and when.
     unplugs: Option<(Instant, u8)>,
+    /// When a person wants an end.
+    interrupts: Option<fn(&Self) -> bool>,
+    is_interrupted: bool,
 }
 
 impl std::fmt::Debug for Bench {
@@ -67,6 +71,18 @@ impl std::fmt::Debug for Bench {
 fn name_of(event: &Event) -> Option<String> {
     match event {
         Event::Violation { .. } | Event::Collision { .. } => Some(event.to_string()),
+        _ => None,
+    }
+}
+
+/// The outputs in a Data_Exchange: SD2, addresses without SAP, SRD.
+fn outputs_in(telegram: &[u8]) -> Option<Vec<u8>> {
+    match telegram {
+        [0x68, _, _, 0x68, 0..=0x7F, 0..=0x7F, code, outputs @ .., _, 0x16]
+            if code & 0x4F == 0x4D || code & 0x4F == 0x4C =>
+        {
+            Some(outputs.to_vec())
+        }
         _ => None,
     }
 }
@@ -87,8 +103,10 @@ impl Bench {
             devices: Vec::new(),
             complaints: Vec::new(),
             said: 0,
-            patience: None,
+            outputs: Vec::new(),
             unplugs: None,
+            interrupts: None,
+            is_interrupted: false,
         }
     }
 
@@ -165,8 +183,15 @@ impl Bench {
 
     /// A slave of somebody else's.
     pub(crate) fn with_stranger(mut self, stranger: Stranger) -> Self {
-        let station = Either::Right(Either::Right(stranger));
+        let station = Either::Right(Either::Right(Either::Left(stranger)));
         self.wire.attach("stranger", station, Attachment::default());
+        self
+    }
+
+    /// A master of somebody else's.
+    pub(crate) fn with_speaker(mut self, speaker: Speaker) -> Self {
+        let station = Either::Right(Either::Right(Either::Right(speaker)));
+        self.wire.attach("speaker", station, Attachment::default());
         self
     }
 
@@ -196,10 +221,15 @@ impl Bench {
 
     fn run_until(&mut self, next: Instant) {
         let (console, complaints, said) = (self.console, &mut self.complaints, &mut self.said);
+        let outputs = &mut self.outputs;
         self.wire.run_until(next, &mut |event| {
             complaints.extend(name_of(event));
-            if let Event::Telegram { from, .. } = event {
-                *said += u64::from(*from == console);
+            if let Event::Telegram { from, octets, .. } = event
+                && *from == console
+            {
+                *said += 1;
+                outputs.extend(outputs_in(octets.octets()));
+                outputs.dedup();
             }
         });
     }
@@ -245,6 +275,11 @@ impl Bench {
         self.wire.detach(id);
     }
 
+    /// Lets turns fail as soon as something is so, until what was begun is wound up.
+    pub(crate) fn interrupt_when(&mut self, is_so: fn(&Self) -> bool) {
+        self.interrupts = Some(is_so);
+    }
+
     pub(crate) fn scan(&mut self, settings: ScanSettings) -> Result<Survey, Trouble> {
         scan(self, settings, &mut |_| {})
     }
@@ -271,11 +306,19 @@ impl Seat for Bench {
     }
 
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
-        if self.patience.take_if(|patience| *patience < self.said).is_some() {
+        if self.interrupts.is_some_and(|is_so| is_so(self)) {
+            self.interrupts = None;
+            self.is_interrupted = true;
+        }
+        if self.is_interrupted {
             return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
         }
         self.step(until);
         Ok(Vec::new())
+    }
+
+    fn wind_up(&mut self) {
+        self.is_interrupted = false;
     }
 }
 

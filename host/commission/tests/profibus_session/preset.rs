@@ -23,6 +23,20 @@ fn a_preset_makes_the_position_and_is_found_in_the_offset() {
 }
 
 #[test]
+fn a_preset_is_sent_twice_with_the_top_bit_and_without_it() {
+    let mut bench = Bench::new().with(7, "amg11-p29");
+    let mut session = bench.open(7, &alone()).unwrap();
+    session.preset(5).unwrap();
+    assert_eq!(bench.outputs, [[0, 0, 0, 0], [0x80, 0, 0, 5], [0, 0, 0, 5]]);
+    let two = configuration::Row::find(0xF0);
+    let mut bench = Bench::new().with(7, "amg11-p29");
+    let mut session = bench.open(7, &SessionSettings { configuration: two, ..alone() }).unwrap();
+    session.preset(0x1234).unwrap();
+    session.release().unwrap();
+    assert_eq!(bench.outputs, [[0, 0], [0x92, 0x34], [0x12, 0x34], [0, 0]]);
+}
+
+#[test]
 fn a_preset_out_of_range_is_refused_and_never_sent() {
     let mut bench = Bench::new().with(7, "amg11-p13");
     let mut session = bench.open(7, &alone()).unwrap();

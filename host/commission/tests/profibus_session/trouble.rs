@@ -1,8 +1,9 @@
 //! What goes wrong on the way.
 
-use codewheel_commission::profibus::MasterSettings;
-use codewheel_commission::{Kind, Name, Reading, Seat, Session};
+use codewheel_commission::profibus::{MasterSettings, SessionSettings};
+use codewheel_commission::{Kind, Name, Reading, Session};
 use codewheel_station::Duration;
+use codewheel_station::rs485::BaudRate;
 
 use crate::bench::{Bench, PLC, RATE, alone, quick};
 
@@ -59,12 +60,13 @@ fn an_encoder_that_dies_is_a_time_out_and_nothing_hangs() {
     let mut bench = Bench::new().with(7, "amg11-p29");
     bench.unplug_after(Duration::from_secs(3), 7);
     let mut session = bench.open(7, &alone()).unwrap();
-    let dies = session.now() + Duration::from_secs(3);
-    while session.now() < dies {
-        if session.sample().is_err() {
-            break;
+    let last = loop {
+        match session.sample() {
+            Ok(sample) => assert!(sample.cycle.is_some()),
+            Err(trouble) => break trouble,
         }
-    }
+    };
+    assert_eq!(last.kind, Kind::TimeOut);
     let name = Name::Key("direction".to_owned());
     for trouble in [
         session.sample().unwrap_err(),
@@ -81,32 +83,27 @@ fn an_encoder_that_dies_is_a_time_out_and_nothing_hangs() {
     assert_eq!(bench.said, said);
 }
 
+/// Its watchdog has nothing to do with it: that is the slave's.
 #[test]
-fn whoever_is_interrupted_while_opening_lets_the_slave_go_and_falls_silent() {
-    let mut interrupted = 0;
-    for telegrams in 0.. {
-        let mut bench = Bench::new().with(7, "amg11-p29");
-        bench.patience = Some(telegrams);
-        let Err(trouble) = bench.open(7, &alone()).map(drop) else { break };
-        assert_eq!(trouble.kind, Kind::Bus, "{trouble}");
-        interrupted += 1;
-        let said = bench.said;
-        // Long before its watchdog would let it go.
-        bench.run(Duration::from_millis(100));
-        assert_eq!(bench.said, said, "{telegrams}");
-        let snapshot = bench.device(7).snapshot(bench.now());
-        let master = snapshot.profibus().and_then(|state| state.master);
-        assert_eq!(master, None, "after {telegrams} telegrams");
+fn a_slave_that_says_no_more_is_told_after_two_seconds_or_longer_at_slow_rates() {
+    for (rate, most) in [(RATE, 2_100), (BaudRate::Kbit187_5, 2_200), (BaudRate::Kbit9_6, 5_000)] {
+        let mut bench = Bench::at(rate).with(7, "amg11-p29");
+        bench.unplug_after(Duration::from_secs(10), 7);
+        let settings = SessionSettings { master: quick(rate), ..alone() };
+        let mut session = bench.open(7, &settings).unwrap();
+        let mut heard = session.now();
+        let trouble = loop {
+            match session.sample() {
+                Ok(sample) => heard = sample.at,
+                Err(trouble) => break trouble,
+            }
+        };
+        assert_eq!(trouble.kind, Kind::TimeOut, "{trouble}");
+        let silence = session.now().since(heard);
+        let (least, most) = (Duration::from_millis(1_900), Duration::from_millis(most));
+        assert!(silence >= least && silence < most, "{silence} at {rate}");
+        let told = session.now();
+        session.release().unwrap();
+        assert!(session.now().since(told) < Duration::from_millis(500), "{rate}");
     }
-    assert!(interrupted > 5, "{interrupted}");
-}
-
-#[test]
-fn whoever_is_interrupted_while_scanning_falls_silent() {
-    let mut bench = Bench::new().with(7, "amg11-p29");
-    bench.patience = Some(40);
-    bench.scan(quick(RATE)).unwrap_err();
-    let said = bench.said;
-    bench.run(Duration::from_secs(1));
-    assert_eq!(bench.said, said);
 }

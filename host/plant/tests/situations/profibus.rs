@@ -79,6 +79,23 @@ fn a_preset_of_the_plan_is_executed_once_and_outlives_a_power_cut() {
     assert_eq!(positions(&mut bus, 6_000), (Some(43), 43), "with the parameters it was made under");
 }
 
+/// PROFIBUS manual §7.4: once with the top bit and then again without it.
+#[test]
+fn a_preset_is_sent_twice_with_the_top_bit_and_without_it() {
+    let mut bus = bus("500k", "amg11-p29", "", "preset = [{ at = \"1s\", value = 42 }]");
+    let mut outputs: Vec<[u8; 4]> = Vec::new();
+    bus.run_until(millis(2_000), &mut |event| {
+        if let Event::Telegram { octets, .. } = event
+            && let [0x68, 7, 7, 0x68, 7, 2, _, first, second, third, last, _, 0x16] =
+                *octets.octets()
+        {
+            outputs.push([first, second, third, last]);
+        }
+    });
+    outputs.dedup();
+    assert_eq!(outputs, [[0; 4], [0x80, 0, 0, 42], [0, 0, 0, 42]]);
+}
+
 #[test]
 fn a_power_cut_while_a_preset_is_written_leaves_the_old_or_the_new_one() {
     let (mut kept, mut lost) = (0, 0);

@@ -2,13 +2,14 @@
 
 use codewheel_station::Instant;
 
-use super::{Phase, REFUSED_TIME, REPEATS, RETRY_TIME, Slave, Then};
+use super::{Held, Phase, REFUSED_TIME, REPEATS, RETRY_TIME, Slave, Then};
 use crate::connection;
-use crate::explicit::{Error, GeneralStatus};
+use crate::explicit::{BodyFormat, Error, GeneralStatus};
 use crate::scanner::exchange::{Answer, Ended, Port};
 use crate::scanner::io::IO_DATA_OCTETS;
 use crate::scanner::settings::{IdentityCode, Refusal};
 use crate::scanner::steps::{RELEASES, Step, release};
+use crate::server::choice;
 
 /// The coarsest clock that a rate may be rounded up to, in ms.
 const COARSEST_CLOCK: u16 = 1_000;
@@ -35,7 +36,11 @@ impl Slave {
 
     /// Releases `RELEASES[index]` and what follows, then goes on.
     pub(super) fn release_from(&mut self, index: usize, then: Then) {
-        let holds = |choice: &u8| then == Then::Allocate || self.settings.choice() & choice != 0;
+        let holds = |choice: &u8| match then {
+            Then::Allocate => true,
+            Then::Resume => *choice == choice::POLL,
+            Then::Leave | Then::Vanish => self.settings.choice() & choice != 0,
+        };
         let next = RELEASES.iter().enumerate().skip(index).find(|(_, choice)| holds(choice));
         if let Some((index, choice)) = next {
             self.phase = Phase::Releasing { index, then };
@@ -56,7 +61,8 @@ impl Slave {
         let Some(ended) = self.exchange.ended() else { return };
         self.exchange.stop();
         if ended != Ended::Answered {
-            if self.repeats < REPEATS {
+            // Where nobody has answered an allocation, nobody is likely to answer now.
+            if self.repeats < REPEATS && self.held == Held::Connections {
                 self.repeats += 1;
                 return self.release_from(index, then);
             }
@@ -65,6 +71,10 @@ impl Slave {
                 self.repeats = 0;
                 return match then {
                     Then::Allocate => self.leave(now, RETRY_TIME),
+                    Then::Resume => {
+                        self.settings.poll = None;
+                        self.leave(now, RETRY_TIME);
+                    }
                     Then::Leave => self.leave(now, REFUSED_TIME),
                     Then::Vanish => self.phase = Phase::Gone,
                 };
@@ -77,7 +87,14 @@ impl Slave {
         if self.exchange.is_idle() {
             match then {
                 Then::Allocate => {}
-                Then::Leave => self.leave(now, REFUSED_TIME),
+                Then::Resume => {
+                    self.settings.poll = None;
+                    self.begin_exchanging_data(now);
+                }
+                Then::Leave => {
+                    self.held = Held::Nothing;
+                    self.leave(now, REFUSED_TIME);
+                }
                 Then::Vanish => self.phase = Phase::Gone,
             }
         }
@@ -91,6 +108,7 @@ impl Slave {
             // An allocation is not repeated here: whether anybody is there is what it asks.
             if step == Step::Allocate {
                 self.refusal = None;
+                self.held = Held::Perhaps;
             } else if self.repeats < REPEATS {
                 self.repeats += 1;
                 return self.enter(step);
@@ -99,7 +117,17 @@ impl Slave {
         }
         self.repeats = 0;
         match (step, self.own.answer()) {
-            (Step::Allocate, Answer::Refused(error)) => return self.not_allocated(now, error),
+            (Step::Allocate | Step::AllocatePoll, Answer::Refused(error)) => {
+                return self.not_allocated(now, step, error);
+            }
+            (Step::Allocate, Answer::Done(data)) => {
+                self.held = Held::Connections;
+                let format = data.first().copied().unwrap_or_default();
+                let Some(known) = BodyFormat::from_octet(format) else {
+                    return self.refuse(Refusal::BodyFormat { format });
+                };
+                self.format = known;
+            }
             // A slave that knows no deferred delete gets its explicit connection kept alive; one
             // that does not tell what it consumes gets nothing.
             (Step::DeferredDelete, answer) => {
@@ -123,11 +151,16 @@ impl Slave {
         }
     }
 
-    fn not_allocated(&mut self, now: Instant, error: Error) {
+    fn not_allocated(&mut self, now: Instant, step: Step, error: Error) {
         if error.general == GeneralStatus::ALREADY_IN_STATE && !self.released {
             self.released = true;
+            self.held = Held::Connections;
             return self.release_from(0, Then::Allocate);
         }
+        if step != Step::Allocate {
+            return self.refuse(Refusal::Service(error));
+        }
+        self.held = Held::Nothing;
         self.refusal = Some(Refusal::Service(error));
         self.leave(now, REFUSED_TIME);
     }
@@ -167,6 +200,7 @@ impl Slave {
                 self.change_rate = granted(asked, value);
             }
             Step::Allocate
+            | Step::AllocatePoll
             | Step::DeferredDelete
             | Step::PollPath
             | Step::ChangePath

@@ -6,21 +6,23 @@ mod running;
 use codewheel_station::can::Frame;
 use codewheel_station::{Deadline, Duration, Instant};
 
+use super::IO_DATA_OCTETS;
 use super::exchange::{Ended, Exchange, Port, Question};
 use super::io::{Heard, Input, Output};
 use super::settings::{Refusal, SlaveSettings};
 use super::steps::{Body, Step};
 use super::view::{SlaveState, SlaveView, Ticket};
-use super::{ANSWER_TIME, IO_DATA_OCTETS};
-use crate::explicit::Header;
+use crate::explicit::{BodyFormat, Header};
 use crate::{MacId, connection};
 
 /// The longest request body.
 pub(super) const REQUEST_OCTETS: usize = 64;
+/// The same with the high octets of class and instance.
+const WIDE_REQUEST_OCTETS: usize = REQUEST_OCTETS + 2;
 /// The longest response body.
 const RESPONSE_OCTETS: usize = 256;
 /// The longest request of our own, and the longest response to one.
-const OWN_OCTETS: usize = 8;
+const OWN_OCTETS: usize = 10;
 const OWN_RESPONSE_OCTETS: usize = 16;
 
 /// How long the scanner leaves a slave alone after an attempt failed.
@@ -64,6 +66,8 @@ enum Phase {
 enum Then {
     /// Allocate anew what an earlier life of ours held.
     Allocate,
+    /// Go on with the explicit connection alone.
+    Resume,
     /// Leave the slave alone: it refused, or is another device.
     Leave,
     /// Forget the slave.
@@ -95,6 +99,15 @@ enum Asked {
     Ended(Ended),
 }
 
+/// What of ours the slave may hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Held {
+    Nothing,
+    /// An allocation was sent, and no answer has come.
+    Perhaps,
+    Connections,
+}
+
 #[derive(Clone, Debug)]
 pub(super) struct Slave {
     pub(super) settings: SlaveSettings,
@@ -104,13 +117,16 @@ pub(super) struct Slave {
     repeats: u8,
     /// This attempt has already released what an earlier life of ours held.
     released: bool,
+    held: Held,
+    /// How its explicit connection has class and instance.
+    format: BodyFormat,
     /// Whether the slave knows deferred delete.
     defers_delete: bool,
     removing: bool,
     exchange: Exchange,
     whose: Whose,
     own: Question<OWN_OCTETS, OWN_RESPONSE_OCTETS>,
-    user: Question<REQUEST_OCTETS, RESPONSE_OCTETS>,
+    user: Question<WIDE_REQUEST_OCTETS, RESPONSE_OCTETS>,
     asked: Asked,
     ticket: Option<Ticket>,
     refusal: Option<Refusal>,
@@ -145,6 +161,8 @@ impl Slave {
             phase: Phase::Waiting { until: Instant::ZERO },
             repeats: 0,
             released: false,
+            held: Held::Nothing,
+            format: BodyFormat::Class8Instance8,
             defers_delete: false,
             removing: false,
             exchange: Exchange::new(master, settings.mac),
@@ -216,13 +234,9 @@ impl Slave {
     /// Releases the slave, then forgets it; at once where it holds nothing of ours, or nobody
     /// would hear the release.
     pub(super) fn remove(&mut self, on_line: bool) {
-        let holds = !matches!(
-            self.phase,
-            Phase::Waiting { .. } | Phase::Gone | Phase::Configuring { step: Step::Allocate }
-        );
         self.settle();
         self.removing = true;
-        if holds && on_line {
+        if self.held != Held::Nothing && on_line {
             self.release_from(0, Then::Vanish);
         } else {
             self.phase = Phase::Gone;
@@ -234,6 +248,7 @@ impl Slave {
         self.settle();
         self.exchange.forget();
         self.refusal = None;
+        self.held = Held::Nothing;
         self.phase =
             if self.removing { Phase::Gone } else { Phase::Waiting { until: Instant::ZERO } };
     }
@@ -279,8 +294,16 @@ impl Slave {
         self.phase = if self.removing { Phase::Gone } else { Phase::Waiting { until: now + time } };
     }
 
-    fn ask(&mut self, port: Port, (body, length): Body) {
-        self.own.ask(port, body.get(..length).unwrap_or(&body), ANSWER_TIME);
+    fn ask(&mut self, port: Port, body: Body) {
+        self.ask_within(port, body, port.patience());
+    }
+
+    fn ask_within(&mut self, port: Port, (body, length): Body, patience: Duration) {
+        let format = match port {
+            Port::Unconnected => BodyFormat::Class8Instance8,
+            Port::Connected => self.format,
+        };
+        self.own.ask(port, format, body.get(..length).unwrap_or(&body), patience);
         self.exchange.begin(&mut self.own);
     }
 
@@ -408,6 +431,10 @@ impl Slave {
         if self.is_running() && self.whose == Whose::User {
             self.exchange.transmit(now, &self.user)
         } else {
+            let allocates = matches!(self.phase, Phase::Configuring { step: Step::Allocate });
+            if allocates && self.held == Held::Nothing {
+                self.held = Held::Perhaps;
+            }
             self.exchange.transmit(now, &self.own)
         }
     }

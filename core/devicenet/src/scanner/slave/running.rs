@@ -3,10 +3,12 @@
 
 use codewheel_station::{Deadline, Duration, Instant};
 
-use super::{Asked, KEEP_ALIVE_TIME, Slave, Whose};
-use crate::scanner::exchange::{Answer, Ended, Port};
-use crate::scanner::settings::NotTaken;
-use crate::scanner::steps::{allocate, defer_delete, keep_alive};
+use super::{Asked, KEEP_ALIVE_TIME, Phase, Slave, Then, Whose};
+use crate::explicit::BodyFormat;
+use crate::scanner::exchange::{Answer, Ended, Port, UNCONNECTED_TIME};
+use crate::scanner::io::Input;
+use crate::scanner::settings::{NotTaken, PollSettings};
+use crate::scanner::steps::{Step, allocate, defer_delete, keep_alive};
 use crate::scanner::view::{Response, Ticket};
 use crate::server::choice;
 
@@ -15,6 +17,10 @@ impl Slave {
         self.whose = whose;
         match whose {
             Whose::User => self.exchange.begin(&mut self.user),
+            // One that was switched on anew has no connection over which it could be slow.
+            Whose::KeepAlive if self.suspected => {
+                self.ask_within(Port::Connected, keep_alive(), UNCONNECTED_TIME);
+            }
             Whose::KeepAlive => self.ask(Port::Connected, keep_alive()),
             Whose::Reallocate => {
                 self.ask(Port::Unconnected, allocate(choice::EXPLICIT, self.master));
@@ -79,6 +85,9 @@ impl Slave {
     fn own_ended(&mut self, whose: Whose, ended: Ended) {
         let answer = (ended == Ended::Answered).then(|| self.own.answer());
         let allocated = matches!(answer, Some(Answer::Done(_)));
+        if let (Whose::Reallocate, Some(Answer::Done([format, ..]))) = (whose, answer) {
+            self.format = BodyFormat::from_octet(*format).unwrap_or(self.format);
+        }
         let polled = self.settings.poll.is_some();
         if answer.is_none() && self.repeats == 0 && whose != Whose::User {
             self.repeats = 1;
@@ -106,6 +115,34 @@ impl Slave {
         }
     }
 
+    /// Allocates a poll connection besides what there is.
+    pub(in super::super) fn begin_polling(&mut self, poll: PollSettings) -> Result<(), NotTaken> {
+        self.expect_unasked()?;
+        self.settings.poll = Some(poll);
+        self.poll = Input::new();
+        self.settle();
+        self.enter(Step::AllocatePoll);
+        Ok(())
+    }
+
+    /// Releases the poll connection, and keeps what else there is.
+    pub(in super::super) fn end_polling(&mut self) -> Result<(), NotTaken> {
+        self.expect_unasked()?;
+        self.settle();
+        self.release_from(0, Then::Resume);
+        Ok(())
+    }
+
+    const fn expect_unasked(&self) -> Result<(), NotTaken> {
+        if self.ticket.is_some() {
+            return Err(NotTaken::Busy);
+        }
+        if !matches!(self.phase, Phase::Running) {
+            return Err(NotTaken::NotRunning);
+        }
+        Ok(())
+    }
+
     /// Takes in a request of the user.
     pub(in super::super) fn request(
         &mut self,
@@ -113,14 +150,9 @@ impl Slave {
         body: &[u8],
         patience: Duration,
     ) -> Result<(), NotTaken> {
-        if self.ticket.is_some() {
-            return Err(NotTaken::Busy);
-        }
-        if !self.is_running() {
-            return Err(NotTaken::NotRunning);
-        }
+        self.expect_unasked()?;
         self.ticket = Some(ticket);
-        self.user.ask(Port::Connected, body, patience);
+        self.user.ask(Port::Connected, self.format, body, patience);
         if self.exchange.is_idle() {
             self.asked = Asked::UnderWay { repeated: false };
             self.ask_while_running(Whose::User);

@@ -91,15 +91,23 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         self.leave_io(tried)?;
         let own = self.dialogue.console().mac().map_or(0, MacId::value);
         let allocate = [Service::ALLOCATE.0, class::DEVICENET, 1, choice, own];
-        if let Err(error) = self.serve(tried, &allocate, ANSWER_TIME)? {
-            return Ok(Err(error));
-        }
-        let result = act(self);
         let release = [Service::RELEASE.0, class::DEVICENET, 1, choice];
-        let released = self.serve(tried, &release, ANSWER_TIME);
-        let result = result?;
-        released?.map_err(|error| troubles::refused(tried, error))?;
-        Ok(result)
+        let result = match self.serve(tried, &allocate, ANSWER_TIME) {
+            Ok(Ok(_)) => act(self),
+            Ok(Err(error)) => return Ok(Err(error)),
+            // It may have been done, though nobody has seen the answer.
+            Err(trouble) => Err(trouble),
+        };
+        let result = result.and_then(|result| {
+            let released = self.serve(tried, &release, ANSWER_TIME)?;
+            released.map_err(|error| troubles::refused(tried, error))?;
+            Ok(result)
+        });
+        if result.is_err() {
+            self.dialogue.wind_up();
+            let _ = self.serve(tried, &release, ANSWER_TIME);
+        }
+        result
     }
 
     pub(super) fn set(

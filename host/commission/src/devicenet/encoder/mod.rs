@@ -85,8 +85,7 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         match identity::identify(&mut dialogue, &tried, address) {
             Ok(known) => Ok(Self { dialogue, mac: address, identity: known.identity, watch: None }),
             Err(trouble) => {
-                // What went wrong before is what people must hear.
-                let _ = dialogue.release(&tried, address);
+                dialogue.abandon(&tried, address);
                 Err(trouble)
             }
         }
@@ -109,10 +108,8 @@ impl<S: Seat<Station = Console>> Encoder<S> {
 
     /// Gives the poll connection back, if there is one.
     fn leave_io(&mut self, tried: &str) -> Result<(), Trouble> {
-        if self.watch.take().is_some() {
-            Watch::end(&mut self.dialogue, tried, self.mac)?;
-        }
-        Ok(())
+        self.watch = None;
+        Watch::end(&mut self.dialogue, tried, self.mac)
     }
 
     /// What is sampled from now on is from after a change.

@@ -14,7 +14,7 @@ use crate::{Kind, Sample, Seat, Session, Trouble};
 const SEEN: u64 = 2;
 
 impl<S: Seat<Station = Console>> Encoder<S> {
-    /// Sends the preset with the clock bit low, high and low again, and looks whether it was taken.
+    /// Sends the preset twice, with the clock bit high and then low, and looks whether it was taken.
     pub(super) fn strike(&mut self, preset: u32) -> Result<Sample, Trouble> {
         let tried = format!("preset the encoder at address {} to {preset}", self.address);
         let served = match &self.standing {
@@ -39,7 +39,7 @@ impl<S: Seat<Station = Console>> Encoder<S> {
             return Err(out_of_range(tried, &served, largest));
         }
         // The slave must see the bit low first: it counts as high when the exchange begins.
-        for (value, clock) in [(0, false), (preset, true), (0, false)] {
+        for (value, clock) in [(0, false), (preset, true), (preset, false)] {
             self.put(&tried, served.configuration, value, clock)?;
         }
         let after = self.read_diagnosis(&tried)?;
@@ -70,17 +70,7 @@ impl<S: Seat<Station = Console>> Encoder<S> {
     ) -> Result<(), Trouble> {
         let address = self.address;
         let until = self.conversation.patience();
-        let wide = (value | u32::from(clock) << 31).to_be_bytes();
-        let [.., high, low] = value.to_be_bytes();
-        let narrow = [high | u8::from(clock) << 7, low];
-        let octets: &[u8] = if configuration.outputs == 4 { &wide } else { &narrow };
-        let Some(master) = self.conversation.console().master_mut() else {
-            return Err(self.silence(tried));
-        };
-        if let Err(error) = master.set_outputs(address, octets) {
-            return Err(Trouble::new(Kind::Usage, tried, error.to_string(), ""));
-        }
-        let since = master.slave(address).map_or(0, |slave| slave.answers);
+        let since = self.set_outputs(tried, configuration, value, clock)?;
         let seen = |console: &mut Console, _| {
             let slave = console.master()?.slave(address)?;
             let is_seen = slave.state == SlaveState::DataExchange && slave.answers >= since + SEEN;
@@ -92,12 +82,43 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         }
     }
 
-    /// Lets the outputs be zero, as far as the slave still listens.
-    pub(super) fn zero(&mut self, configuration: &configuration::Row) -> Result<(), Trouble> {
-        match configuration.outputs {
-            0 => Ok(()),
-            _ => self.put("release the encoder", configuration, 0, false),
+    /// Gives the slave other outputs, and tells how often it had answered before.
+    fn set_outputs(
+        &mut self,
+        tried: &str,
+        configuration: &configuration::Row,
+        value: u32,
+        clock: bool,
+    ) -> Result<u64, Trouble> {
+        let address = self.address;
+        let wide = (value | u32::from(clock) << 31).to_be_bytes();
+        let [.., high, low] = value.to_be_bytes();
+        let narrow = [high | u8::from(clock) << 7, low];
+        let octets: &[u8] = if configuration.outputs == 4 { &wide } else { &narrow };
+        let Some(master) = self.conversation.console().master_mut() else {
+            return Err(self.silence(tried));
+        };
+        if let Err(error) = master.set_outputs(address, octets) {
+            return Err(Trouble::new(Kind::Usage, tried, error.to_string(), ""));
         }
+        Ok(master.slave(address).map_or(0, |slave| slave.answers))
+    }
+
+    /// Lets the outputs be zero, as long as the slave exchanges data.
+    pub(super) fn zero(&mut self, configuration: &configuration::Row) -> Result<(), Trouble> {
+        if configuration.outputs == 0 {
+            return Ok(());
+        }
+        let address = self.address;
+        let until = self.conversation.patience();
+        let since = self.set_outputs("release the encoder", configuration, 0, false)?;
+        let is_over = |console: &mut Console, _| {
+            let slave = console.master()?.slave(address)?;
+            let is_over = slave.state != SlaveState::DataExchange || slave.answers >= since + SEEN;
+            is_over.then_some(())
+        };
+        self.conversation.wait(until, is_over)?;
+        Ok(())
     }
 
     /// The latest position of a slave that is served.

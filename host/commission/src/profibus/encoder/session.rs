@@ -6,10 +6,10 @@ use codewheel_station::Instant;
 
 use super::{BroughtUp, Encoder, Served, Standing, no_parameter, refused_remedy, told};
 use crate::profibus::chosen::number_for;
-use crate::profibus::eavesdropper::{position, sample_of};
+use crate::profibus::eavesdropper::{cycles, position, sample_of};
 use crate::profibus::identity::Told;
 use crate::profibus::values::{Known, for_the_project, raw_value, raw_values};
-use crate::profibus::{Console, Diagnosis, Event, SlaveState};
+use crate::profibus::{Acyclic, Console, Diagnosis, Event, SlaveState};
 use crate::{Identity, Kind, Name, Reading, Sample, Seat, Session, Trouble, Value};
 
 impl<S: Seat<Station = Console>> Encoder<S> {
@@ -228,7 +228,12 @@ impl<S: Seat<Station = Console>> Session for Encoder<S> {
         }
         let (address, last) = (self.address, self.sampled);
         let is_served = matches!(self.standing, Standing::Served(_));
-        let until = self.conversation.patience();
+        let console = self.conversation.console();
+        let cycles = match console.master().filter(|_| is_served) {
+            Some(master) => master.cycle_times(),
+            None => cycles(console.overheard(), address),
+        };
+        let until = self.conversation.silence(cycles.mean());
         let newer = |console: &mut Console, _| {
             let sample = if is_served {
                 let slave = console.master()?.slave(address)?;
@@ -262,7 +267,10 @@ impl<S: Seat<Station = Console>> Session for Encoder<S> {
         if let Standing::Served(served) = standing {
             // One that is gone needs no release.
             let _ = self.zero(served.configuration);
-            self.let_go(&tried)?;
+            if let Some(master) = self.conversation.console().master_mut() {
+                master.stop();
+            }
+            self.conversation.ask(&tried, self.address, Acyclic::Unlock)?;
         }
         self.take_events();
         self.conversation.leave()
