@@ -50,8 +50,10 @@ pub(super) fn run(
         let bar = Bar::new(encoder.chatter);
         plan.carry_out(encoder.session.as_mut(), &circumstances, &mut |progress| bar.show(progress))
     };
-    tell(&report, arguments, Some(&undo))?;
+    let told = tell(&report, arguments, Some(&undo));
+    // Also where nobody reads what is told.
     encoder.say(&format!("undo: {undo}"));
+    told?;
     let address = encoder.session.address();
     match report.verdict {
         Verdict::Done => Ok(()),

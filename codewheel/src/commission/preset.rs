@@ -57,13 +57,8 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
         (None, _) => command(&["preset", &before.to_string()], encoder.at),
     };
     let undo = [undo];
-    let mut out = std::io::stdout().lock();
-    if arguments.format.json {
-        let line = Line { before, after: sample.position, undo: &undo };
-        writeln!(out, "{}", serde_json::to_string(&line).map_err(std::io::Error::from)?)?;
-    } else {
-        writeln!(out, "position: {before} → {} step", sample.position)?;
-    }
+    let told = tell(arguments, &Line { before, after: sample.position, undo: &undo });
+    // Also where nobody reads what is told.
     if let (Some(wanted), Some(made)) = (arguments.by, made)
         && shortest(wanted, ring) != made
     {
@@ -71,6 +66,7 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
     }
     tell_undo(&undo, encoder);
     tell_how_long(encoder);
+    told?;
     let off = shortest(i64::from(sample.position) - i64::from(wanted), ring);
     // A shaft that stands may stand between two steps.
     if is_turning || off.abs() <= 1 {
@@ -83,6 +79,16 @@ pub(super) fn run(encoder: &mut Encoder, arguments: &PresetArguments) -> Result<
         "if the shaft has moved meanwhile, stop it and do it again",
     )
     .into())
+}
+
+fn tell(arguments: &PresetArguments, line: &Line<'_>) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    if arguments.format.json {
+        writeln!(out, "{}", serde_json::to_string(line).map_err(std::io::Error::from)?)?;
+    } else {
+        writeln!(out, "position: {} → {} step", line.before, line.after)?;
+    }
+    Ok(())
 }
 
 /// The position now, and whether the shaft turns. The first sample may have come a while ago.

@@ -77,29 +77,39 @@ pub(super) fn run(
     arguments.consent.ask(service.question(), encoder)?;
     service.carry_out(encoder)?;
     let after = Settings::of(encoder)?;
-    let changes = before.changes(&after);
     let undo = before.undo(&after, encoder);
-    let mut out = std::io::stdout().lock();
-    if arguments.format.json {
-        let line = Line { done: service, changed: before.lines(&after), undo: &undo };
-        writeln!(out, "{}", serde_json::to_string(&line).map_err(std::io::Error::from)?)?;
-    } else {
-        let offsets = before.offsets(&after);
-        match service {
-            Service::Save => writeln!(out, "saved")?,
-            _ if changes.is_empty() && offsets.is_none() => writeln!(out, "nothing changed")?,
-            _ => {}
-        }
-        for change in &changes {
-            writeln!(out, "{change}")?;
-        }
-        if let Some((before, after)) = offsets {
-            writeln!(out, "offset: {before} → {after} step")?;
-        }
-    }
+    let told = tell(service, arguments, (&before, &after), &undo);
+    // Also where nobody reads what is told.
     tell_undo(&undo, encoder);
     if service == Service::Reset && !undo.is_empty() {
         tell_how_long(encoder);
+    }
+    told
+}
+
+fn tell(
+    service: Service,
+    arguments: &ServiceArguments,
+    (before, after): (&Settings, &Settings),
+    undo: &[String],
+) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    if arguments.format.json {
+        let line = Line { done: service, changed: before.lines(after), undo };
+        writeln!(out, "{}", serde_json::to_string(&line).map_err(std::io::Error::from)?)?;
+        return Ok(());
+    }
+    let (changes, offsets) = (before.changes(after), before.offsets(after));
+    match service {
+        Service::Save => writeln!(out, "saved")?,
+        _ if changes.is_empty() && offsets.is_none() => writeln!(out, "nothing changed")?,
+        _ => {}
+    }
+    for change in &changes {
+        writeln!(out, "{change}")?;
+    }
+    if let Some((before, after)) = offsets {
+        writeln!(out, "offset: {before} → {after} step")?;
     }
     Ok(())
 }

@@ -92,7 +92,8 @@ pub(super) fn run(
     }
     let mut changed = before.lines(&after);
     changed.retain(|line| line.name != old.name);
-    tell(arguments, &Change { before: &old, after: &after_write }, changed, &undo)?;
+    let told = tell(arguments, &Change { before: &old, after: &after_write }, changed, &undo);
+    // Also where nobody reads what is told.
     tell_undo(&undo, encoder);
     match bus {
         Bus::DeviceNet => tell_how_long_it_lasts(&old.name, encoder),
@@ -103,6 +104,7 @@ pub(super) fn run(
             tell_project(encoder, &after_write);
         }
     }
+    told?;
     if after_write.reading == wanted {
         return Ok(());
     }

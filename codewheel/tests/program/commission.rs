@@ -211,6 +211,19 @@ fn a_reader_that_goes_away_ends_watching_cleanly() {
 }
 
 #[test]
+fn a_reader_that_goes_away_keeps_nobody_from_hearing_how_a_change_is_undone() {
+    let (_encoder, bus) = encoder();
+    for change in [&["set", "direction", "ccw"][..], &["preset", "7"], &["reset"]] {
+        let mut changes =
+            Running::start(&[change, &["--yes", "--bus", &bus, "--address", "5"]].concat());
+        changes.close_stdout();
+        let (status, messages) = changes.end();
+        assert_eq!(status.code(), Some(0), "{messages}");
+        assert!(messages.contains("codewheel: undo: codewheel "), "{change:?}: {messages}");
+    }
+}
+
+#[test]
 fn ctrl_c_while_the_bus_is_listened_to_ends_at_once() {
     let (_encoder, bus) = encoder();
     let scan = Running::start(&["scan", "--bus", &bus, "--listen-for", "1h"]);

@@ -98,9 +98,8 @@ pub fn compare(was: &Passport, is: &Passport) -> Vec<Difference> {
             differences.push(Difference { subject, name: name.to_owned(), was, is });
         }
     };
-    let units = (was.nameplate.serial, is.nameplate.serial);
-    let other_unit = matches!(units, (Some(was), Some(is)) if was != is);
-    if let (Some(was), Some(is)) = units {
+    let is_other_unit = was.nameplate.is_same_unit(&is.nameplate) == Some(false);
+    if let (Some(was), Some(is)) = (was.nameplate.serial, is.nameplate.serial) {
         differ(Subject::Unit, "serial", number(Some(was)), number(Some(is)));
     }
     if was.bus != is.bus {
@@ -132,7 +131,7 @@ pub fn compare(was: &Passport, is: &Passport) -> Vec<Difference> {
         }
     }
     if let (Some(before), Some(now)) = (was.position.offset, is.position.offset)
-        && !other_unit
+        && !is_other_unit
         && !same_offset(was, before, now)
     {
         differ(Subject::Offset, "offset", number(Some(before)), number(Some(now)));

@@ -123,6 +123,27 @@ impl From<Identity> for Nameplate {
     }
 }
 
+impl Nameplate {
+    /// Whether two nameplates are of one and the same encoder; `None` where nothing tells. A serial
+    /// number alone does not: encoders of other makers and models count theirs from 1, too.
+    fn is_same_unit(&self, other: &Self) -> Option<bool> {
+        fn contradict<T: PartialEq>(one: &Option<T>, other: &Option<T>) -> bool {
+            one.as_ref().zip(other.as_ref()).is_some_and(|(one, other)| one != other)
+        }
+        let is_other = contradict(&self.serial, &other.serial)
+            || contradict(&self.vendor, &other.vendor)
+            || contradict(&self.device_type, &other.device_type)
+            || contradict(&self.product_code, &other.product_code)
+            || contradict(&self.product_name, &other.product_name)
+            || contradict(&self.singleturn_resolution, &other.singleturn_resolution)
+            || contradict(&self.revolutions, &other.revolutions);
+        if is_other {
+            return Some(false);
+        }
+        self.serial.zip(other.serial).map(|_| true)
+    }
+}
+
 /// One setting.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {

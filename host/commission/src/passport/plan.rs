@@ -84,9 +84,9 @@ const SCALE: [&str; 2] = [STEPS_PER_TURN, TOTAL_RESOLUTION];
 /// the encoder as it is, and writes nothing.
 ///
 /// `position` is where the machine stands now, in steps of the passport, where a person knows it.
-/// Without it the encoder of the passport, known by its serial number, gets its offset back wherever
-/// the machine stands; for another one the machine must stand where it stood when the passport was
-/// taken.
+/// Without it the encoder of the passport, known by its serial number and its model, gets its offset
+/// back wherever the machine stands; for another one the machine must stand where it stood when the
+/// passport was taken.
 ///
 /// # Errors
 /// [`Kind::Refused`] where this encoder cannot give these positions: another bus, settings beyond what
@@ -225,13 +225,13 @@ fn positioning(
     if let Some(position) = told {
         return stands_there(position);
     }
-    let serials = (goal.nameplate.serial, before.nameplate.serial);
+    let is_same_unit = goal.nameplate.is_same_unit(&before.nameplate);
     let keeps = |offset| {
         let now = before.position.offset;
         !clears && now.is_some_and(|now| same_offset(goal, now, offset))
     };
-    match (serials, goal.position.offset) {
-        ((Some(was), Some(is)), Some(offset)) if was == is => {
+    match (is_same_unit, goal.position.offset) {
+        (Some(true), Some(offset)) => {
             if keeps(offset) {
                 return Ok(Positioning::Nothing);
             }
@@ -240,7 +240,7 @@ fn positioning(
             return Ok(Positioning::Offset { offset });
         }
         // Two encoders have the same offset, other than none, by no chance worth counting on.
-        ((None, _) | (_, None), Some(offset)) if offset != 0 && keeps(offset) => {
+        (None, Some(offset)) if offset != 0 && keeps(offset) => {
             return Ok(Positioning::Nothing);
         }
         _ => {}
@@ -275,7 +275,7 @@ fn positioning(
         if goal.position.at_rest.is_none() {
             warnings.push("whether the shaft was at rest then is not known".to_owned());
         }
-        if matches!(serials, (None, _) | (_, None)) {
+        if is_same_unit.is_none() {
             let near =
                 before.position.steps.zip(total).is_some_and(|(now, total)| {
                     !clears && distance(now, position, Some(total)) <= 1

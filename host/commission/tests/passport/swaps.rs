@@ -1,6 +1,6 @@
 //! One encoder is taken off a machine and another one put in its place: the positions stay.
 
-use codewheel_commission::passport::{Passport, Positioning, Verdict};
+use codewheel_commission::passport::{Passport, Positioning, Subject, Verdict, compare};
 use codewheel_commission::{Reading, Session};
 
 use crate::toy::{self, Toy};
@@ -149,4 +149,18 @@ fn what_was_done_can_be_undone() {
     new.turn(-8_192 * 11);
     assert_eq!(new.position(), 7);
     assert_eq!(new.take().setting("steps-per-turn"), Some(&Reading::Number(360)));
+}
+
+#[test]
+fn another_model_with_the_same_serial_number_is_another_encoder() {
+    let steps = [("steps-per-turn", 3_600), ("total-resolution", 3_600)];
+    let passport = toy::new("amg11-d29", 7, 100).with(&steps).preset_at(300).take();
+    let mut new = toy::new("amg11-d13", 7, 5_000).with(&steps[..1]);
+    let plan = new.plan(&passport, None).unwrap();
+    assert_eq!(plan.positioning(), Positioning::Preset { position: 300 }, "{plan}");
+    assert_eq!(new.apply(&passport, None).verdict, Verdict::Done);
+    assert_eq!(new.position(), 300);
+    // What a preset adds belongs to the disc, so it is no difference between two of them.
+    let differences = compare(&passport, &new.take());
+    assert!(differences.iter().all(|it| it.subject != Subject::Offset), "{differences:?}");
 }
