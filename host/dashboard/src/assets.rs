@@ -1,6 +1,6 @@
 //! The files of the page, which are part of the program.
 
-use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
+use axum::http::header::{ALLOW, CACHE_CONTROL, CONTENT_TYPE, ETAG, IF_NONE_MATCH};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use rust_embed::RustEmbed;
@@ -16,7 +16,7 @@ struct Page;
 /// The file that `uri` names, `/` being `index.html`.
 pub(crate) async fn file(method: Method, uri: Uri, headers: HeaderMap) -> Response {
     if method != Method::GET && method != Method::HEAD {
-        return Problem::new(
+        let problem = Problem::new(
             "method",
             StatusCode::METHOD_NOT_ALLOWED,
             "This cannot be done here",
@@ -24,8 +24,9 @@ pub(crate) async fn file(method: Method, uri: Uri, headers: HeaderMap) -> Respon
                 "{method} {}: this can only be read; /api/v1/openapi.json says what can be done",
                 uri.path()
             ),
-        )
-        .into_response();
+        );
+        // RFC 9110 §15.5.6 asks for what is allowed.
+        return ([(ALLOW, HeaderValue::from_static("GET,HEAD"))], problem).into_response();
     }
     let name = match uri.path() {
         "/" => "index.html",

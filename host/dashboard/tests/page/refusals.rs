@@ -95,7 +95,9 @@ fn whoever_asks_another_way_is_told_which_ways_there_are() {
     assert!(detail.contains("openapi.json"), "{detail}");
     let address = page.address();
     let head = format!("DELETE / HTTP/1.1\nHost: {address}");
-    page.send(&head, "").problem(405);
+    let refused = page.send(&head, "");
+    refused.problem(405);
+    assert_eq!(refused.header("allow"), Some("GET,HEAD"));
     let detail = page.get("/api/v1/events?rate=21").problem(422);
     assert!(detail.contains("1 to 20"), "{detail}");
     page.get("/api/v1/events?rate=fast").problem(422);
