@@ -112,6 +112,8 @@ step_strangers() {
     "$python" strangers/tshark_judges.py --self-test
     "$python" strangers/data_sheets.py --self-test host/datasheet/tests/golden
     "$python" strangers/data_sheets.py host/datasheet/tests/golden
+    "$python" strangers/api_document.py --self-test
+    "$python" strangers/api_document.py "$CARGO_TARGET_DIR/debug/codewheel"
     # Walks mostly wait for the encoder's clock, so they go side by side; but not beside those whose
     # masters are other people's and give up when they are kept waiting.
     # Not local, since the trap outlives this function.
