@@ -1,5 +1,6 @@
 //! The web page of a plant that runs: where it is, and who may see it and change the plant.
 
+use std::ffi::OsString;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
@@ -9,6 +10,9 @@ use codewheel_plant::Running;
 
 use crate::arguments::Chatter;
 use crate::failure::Failure;
+
+/// The variable with the token.
+const TOKEN: &str = "CODEWHEEL_TOKEN";
 
 /// Where the page is, and who may do what.
 #[derive(Args, Debug, Default)]
@@ -20,7 +24,8 @@ pub(crate) struct PageArguments {
     listen: Option<SocketAddr>,
 
     /// What whoever opens the page must know, 16 characters or more; needed where other machines
-    /// can reach it. Open http://ADDRESS:PORT/?token=TOKEN once
+    /// can reach it. Open http://ADDRESS:PORT/?token=TOKEN once. All users of this machine can see
+    /// arguments; the variable CODEWHEEL_TOKEN, which is read without --token, is yours alone
     #[arg(long)]
     token: Option<Token>,
 
@@ -55,10 +60,14 @@ impl PageArguments {
         if self.no_page {
             return Ok(None);
         }
+        let token = match &self.token {
+            Some(token) => Some(token.clone()),
+            None => token_of(std::env::var_os(TOKEN))?,
+        };
         let settings = Settings {
             name: name.to_owned(),
             listen: self.listen,
-            token: self.token.clone(),
+            token,
             read_only: self.read_only,
         };
         match Port::take(settings) {
@@ -88,8 +97,32 @@ pub(crate) fn serve(
     Ok(page)
 }
 
+/// The token that [`TOKEN`] holds; an empty one is none.
+///
+/// # Errors
+/// It cannot be a token. A page without it would be open to more people than was meant.
+fn token_of(variable: Option<OsString>) -> Result<Option<Token>, Failure> {
+    let Some(text) = variable.filter(|text| !text.is_empty()) else { return Ok(None) };
+    let token = text.to_str().unwrap_or_default().parse();
+    token.map(Some).map_err(|error| Failure::Usage(format!("cannot use {TOKEN}: {error}")))
+}
+
 fn parse_address(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| {
         "write an address and a port, such as 127.0.0.1:9000, [::1]:8080 or 0.0.0.0:8080".to_owned()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_token_comes_from_the_environment_unless_it_cannot_be_one() {
+        assert!(token_of(None).unwrap().is_none() && token_of(Some("".into())).unwrap().is_none());
+        assert!(token_of(Some("0123456789abcdef".into())).unwrap().is_some());
+        let failure = token_of(Some("short".into())).expect_err("too short");
+        let text = failure.to_string();
+        assert!(text.contains("CODEWHEEL_TOKEN") && !text.contains("short"), "{text}");
+    }
 }

@@ -7,10 +7,7 @@ mod table;
 use std::io::{self, IsTerminal};
 use std::time::Duration;
 
-use codewheel_device::{DeviceNetState, Network, ProfibusState};
-use codewheel_devicenet::connection::State;
-use codewheel_plant::{BusSnapshot, DeviceSnapshot, SlaveSnapshot, SlaveState};
-use codewheel_profibus as profibus;
+use codewheel_plant::{BusSnapshot, SlaveSnapshot, SlaveState};
 
 /// One way to show a plant.
 pub(crate) trait Show {
@@ -47,32 +44,6 @@ fn fresh<'a>(
     fresh.iter().filter_map(|place| newest.get(*place)?.as_ref())
 }
 
-/// Where a device stands with its master, or, where nobody here masters it, what it says itself.
-fn connection(device: &DeviceSnapshot) -> &'static str {
-    let network = device.device.as_ref().map(|device| &device.network);
-    if let Some(master) = &device.master {
-        return match (master.state, network) {
-            (SlaveState::Absent, _) => word(SlaveState::Absent),
-            (_, Some(Network::Profibus(state))) => standing(state),
-            (SlaveState::Running, Some(Network::DeviceNet(state))) => established(state),
-            (state, _) => word(state),
-        };
-    }
-    match network {
-        None => "absent",
-        Some(Network::Profibus(state)) => standing(state),
-        Some(Network::DeviceNet(state)) => {
-            match (state.poll.or(state.change_of_state), state.explicit) {
-                (Some(State::Established), _) => established(state),
-                (Some(State::TimedOut), _) => "timed-out",
-                (Some(_), _) => "configuring",
-                (None, Some(_)) => "explicit",
-                (None, None) => "none",
-            }
-        }
-    }
-}
-
 /// The slaves that a master of this bus serves and that are none of its devices, by address.
 fn strangers(bus: &BusSnapshot) -> impl Iterator<Item = &(u8, SlaveSnapshot)> {
     let slaves = bus.masters.iter().flat_map(|master| &master.slaves);
@@ -87,35 +58,6 @@ const fn word(state: SlaveState) -> &'static str {
         SlaveState::Running => "running",
         SlaveState::Refused => "refused",
     }
-}
-
-/// Which I/O connection a server exchanges data on.
-const fn established(state: &DeviceNetState) -> &'static str {
-    match (state.poll, state.change_of_state) {
-        (Some(State::Established), Some(State::Established)) => "polled+cos",
-        (Some(State::Established), _) => "polled",
-        (_, Some(State::Established)) => "cos",
-        _ => "explicit",
-    }
-}
-
-/// Where a slave stands on its way to data exchange, with the names of the standard.
-const fn standing(state: &ProfibusState) -> &'static str {
-    match state.state {
-        _ if state.baud_rate.is_none() => "baud-search",
-        profibus::State::WaitPrm if state.faults.parameters || state.faults.not_supported => {
-            "prm-fault"
-        }
-        profibus::State::WaitPrm if state.faults.configuration => "cfg-fault",
-        profibus::State::WaitPrm => "wait-prm",
-        profibus::State::WaitCfg => "wait-cfg",
-        profibus::State::DataExchange => "data-exch",
-    }
-}
-
-/// What the lamp says; dark without power.
-fn lamp(device: &DeviceSnapshot) -> String {
-    device.device.as_ref().map_or_else(|| "off".to_owned(), |device| device.lamp.to_string())
 }
 
 /// Turns a minute, from steps a second.

@@ -131,7 +131,7 @@ fn opened<T>(result: Result<T, Trouble>, stop: &Stop) -> Result<T, Failure> {
         if stop.was_asked() {
             return Failure::Interrupted;
         }
-        if !stop.was_late() {
+        if !stop.is_wanted() {
             return trouble.into();
         }
         let came = "the time given with --timeout was over before";

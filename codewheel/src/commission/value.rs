@@ -54,6 +54,7 @@ pub(super) fn parse(text: &str, value: &Value, labels: &[&str]) -> Result<Readin
     let read = match &value.reading {
         Reading::Text(_) => Some(Reading::Text(text.to_owned())),
         _ if text.contains(':') => octets(text).map(Reading::Octets),
+        Reading::Real(real) => real.parse(text).map(Reading::Real),
         _ => number(text).map(Reading::Number),
     };
     read.ok_or_else(|| {
@@ -85,6 +86,7 @@ fn octets(text: &str) -> Option<Vec<u8>> {
 pub(super) fn plain(reading: &Reading) -> String {
     match reading {
         Reading::Number(number) => number.to_string(),
+        Reading::Real(number) => number.to_string(),
         Reading::Text(text) => text.clone(),
         // One octet alone would be read as a number.
         Reading::Octets(octets) if octets.len() == 1 => format!("{}:", hexadecimal(octets)),
@@ -162,6 +164,7 @@ impl<'a> From<&'a Value> for Line<'a> {
 pub(super) fn json(reading: &Reading) -> serde_json::Value {
     match reading {
         Reading::Number(number) => (*number).into(),
+        Reading::Real(real) => real.number().into(),
         Reading::Text(text) => text.as_str().into(),
         Reading::Octets(octets) => hexadecimal(octets).into(),
     }
@@ -170,6 +173,7 @@ pub(super) fn json(reading: &Reading) -> serde_json::Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use codewheel_commission::Real;
 
     fn value(reading: Reading) -> Value {
         Value {
@@ -224,6 +228,7 @@ mod tests {
             Reading::Octets(vec![0x20]),
             Reading::Octets(vec![0x20, 0x04]),
             Reading::Text("a text".to_owned()),
+            Reading::Real(Real::Single(0.1)),
         ] {
             let old = value(reading.clone());
             assert_eq!(parse(&plain(&reading), &old, &[]).ok(), Some(reading));

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use codewheel_plant::{BusSnapshot, DeviceSnapshot, Report, SlaveSnapshot};
 use serde::Serialize;
 
-use super::{Show, connection, cycle_ms, fresh, lamp, rpm, strangers, word};
+use super::{Show, cycle_ms, fresh, rpm, strangers, word};
 
 pub(super) struct Json;
 
@@ -27,7 +27,7 @@ struct Line<'a> {
     rpm: Option<f64>,
     alarm: Option<bool>,
     warning: Option<bool>,
-    lamp: String,
+    lamp: &'static str,
     connection: &'a str,
     polls_per_second: Option<f64>,
     cycle_ms: Option<f64>,
@@ -119,8 +119,8 @@ fn line<'a>(bus: &'a BusSnapshot, device: &'a DeviceSnapshot) -> Line<'a> {
         rpm: snapshot.map(rpm),
         alarm: snapshot.map(|device| device.alarm),
         warning: snapshot.map(|device| device.warning),
-        lamp: lamp(device),
-        connection: connection(device),
+        lamp: device.state.lamp.text,
+        connection: device.state.connection,
         polls_per_second: device.master.as_ref().map(|master| master.answers_per_second),
         cycle_ms: device.master.as_ref().map(cycle_ms),
         bus_load: bus.load,

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use codewheel_plant::{BusSnapshot, DeviceSnapshot, SlaveSnapshot};
 
-use super::{Show, connection, cycle_ms, fresh, lamp, strangers, word};
+use super::{Show, cycle_ms, fresh, strangers, word};
 
 pub(super) struct Lines {
     names_buses: bool,
@@ -44,8 +44,8 @@ fn line(device: &DeviceSnapshot) -> String {
         )),
         None => line.push_str(" no power"),
     }
-    let lamp = lamp(device).replace(' ', "-");
-    line.push_str(&format!(" led {lamp} connection {}", connection(device)));
+    let lamp = device.state.lamp.text.replace(' ', "-");
+    line.push_str(&format!(" led {lamp} connection {}", device.state.connection));
     if let Some(master) = &device.master {
         line.push_str(&seen(master));
     }

@@ -7,7 +7,7 @@ use codewheel_plant::{BusSnapshot, DeviceSnapshot, SlaveSnapshot};
 use comfy_table::{Table, presets};
 use crossterm::{cursor, execute, queue, terminal};
 
-use super::{Show, connection, cycle_ms, lamp, rpm, strangers, word};
+use super::{Show, cycle_ms, rpm, strangers, word};
 
 /// How often the table is drawn anew.
 const PERIOD: Duration = Duration::from_millis(200);
@@ -111,8 +111,8 @@ fn cells(device: &DeviceSnapshot) -> [String; 9] {
         of_device(|device| format!("{:>9}", device.position)),
         of_device(|device| format!("{:>5}", device.turns())),
         of_device(|device| format!("{:>8} steps/s {:>7.1} rpm", device.velocity, rpm(device))),
-        format!("{:<14}", lamp(device)),
-        format!("{:<11}", connection(device)),
+        format!("{:<14}", device.state.lamp.text),
+        format!("{:<11}", device.state.connection),
         device
             .master
             .as_ref()

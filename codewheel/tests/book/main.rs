@@ -4,6 +4,8 @@
 mod chapters;
 mod commands;
 mod links;
+#[path = "../plant/mod.rs"]
+mod plant;
 
 use std::path::{Path, PathBuf};
 

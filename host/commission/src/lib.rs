@@ -27,6 +27,6 @@ mod survey;
 mod trouble;
 
 pub use seat::{CanSeat, Rs485Seat, Seat};
-pub use session::{Identity, Name, Reading, Sample, Session, Value};
+pub use session::{Identity, Name, Reading, Real, Sample, Session, Value};
 pub use survey::{Found, Owner, Progress, Role, Survey};
 pub use trouble::{Kind, Trouble};

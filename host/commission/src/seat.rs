@@ -22,13 +22,9 @@ pub trait Seat {
     /// first. Gives what people may want to hear.
     ///
     /// # Errors
-    /// [`LinkError`] when the port is lost for good.
+    /// [`LinkError`] when the port is lost for good. A seat on which a person can ask for an end fails
+    /// one turn then, and goes on for as long as it takes to undo what was begun.
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError>;
-
-    /// Lets turns go on that failed because a person wanted an end: what was begun on the bus is now
-    /// undone, which takes a few more. Called where something is given up, whatever the reason. There
-    /// is nothing to do for a seat whose turns fail for the port alone.
-    fn wind_up(&mut self) {}
 }
 
 /// A seat that is lent.
@@ -45,10 +41,6 @@ impl<S: Seat + ?Sized> Seat for &mut S {
 
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
         S::turn(self, until)
-    }
-
-    fn wind_up(&mut self) {
-        S::wind_up(self);
     }
 }
 

@@ -1,5 +1,7 @@
 //! One encoder, asked and told by the same words whatever its bus.
 
+use std::fmt;
+
 use codewheel_device::Product;
 use codewheel_device::product::Bus;
 use codewheel_station::Instant;
@@ -48,11 +50,61 @@ pub enum Name {
     Octet(u8),
 }
 
+/// A number with a fraction, as precise as its place is. Two are equal that are written alike.
+#[derive(Clone, Copy, Debug)]
+pub enum Real {
+    /// In four octets.
+    Single(f32),
+    /// In eight octets.
+    Double(f64),
+}
+
+impl Real {
+    /// Reads a number for the same place; `None` where it is none.
+    #[must_use]
+    pub fn parse(self, text: &str) -> Option<Self> {
+        let number: f64 = text.parse().ok()?;
+        let real = match self {
+            Self::Single(_) => Self::Single(number as f32),
+            Self::Double(_) => Self::Double(number),
+        };
+        real.number().is_finite().then_some(real)
+    }
+
+    /// The number that is written so: 0.1 in four octets is 0.1, not 0.100000001.
+    #[must_use]
+    pub fn number(self) -> f64 {
+        match self {
+            Self::Single(number) => number.to_string().parse().unwrap_or(number.into()),
+            Self::Double(number) => number,
+        }
+    }
+}
+
+impl fmt::Display for Real {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Single(number) => number.fmt(f),
+            Self::Double(number) => number.fmt(f),
+        }
+    }
+}
+
+impl PartialEq for Real {
+    fn eq(&self, other: &Self) -> bool {
+        self.to_string() == other.to_string()
+    }
+}
+
+impl Eq for Real {}
+
 /// What a value is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// A number.
     Number(i64),
+    /// A number with a fraction.
+    Real(Real),
     /// A text.
     Text(String),
     /// Octets, as they lie on the bus.
@@ -70,7 +122,8 @@ pub struct Value {
     pub title: String,
     /// What it is now.
     pub reading: Reading,
-    /// The name of that value, where it has one: `CW`.
+    /// The name of that value, where it has one: `CW`; of a scaled one what it means in its unit, with
+    /// the number that is written: `23.7 (raw 237)`.
     pub label: Option<String>,
     /// The unit; empty where there is none.
     pub unit: String,

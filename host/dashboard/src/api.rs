@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Json;
 use axum::body::Bytes;
@@ -25,6 +26,8 @@ use crate::view::{GroupDocument, PlantDocument, ValueDocument};
 
 /// The largest body of a request, in octets.
 pub(crate) const BODY: usize = 64 * 1024;
+/// How long a body may be under way.
+const BODY_LASTS: Duration = Duration::from_secs(10);
 
 /// Every route of the API, each with its part of the document that describes it.
 pub(crate) fn routes() -> OpenApiRouter<Arc<Shared>> {
@@ -165,7 +168,16 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Asked<T> {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
         let path = request.uri().path().to_owned();
-        let body = Bytes::from_request(request, state).await.map_err(|error| {
+        let body = tokio::time::timeout(BODY_LASTS, Bytes::from_request(request, state)).await;
+        let body = body.map_err(|_| {
+            Problem::new(
+                "slow",
+                StatusCode::REQUEST_TIMEOUT,
+                "The request is too slow",
+                format!("{path}: its body has not come within {BODY_LASTS:?}: send it at once"),
+            )
+        })?;
+        let body = body.map_err(|error| {
             let text = error.body_text();
             match error.status() {
                 StatusCode::PAYLOAD_TOO_LARGE => Problem::new(
@@ -528,6 +540,17 @@ mod tests {
                 .as_deref(),
             Ok("drop-answers count=3 for=5s probability=0.5")
         );
+    }
+
+    #[test]
+    fn a_body_that_does_not_come_is_not_waited_for_for_ever() {
+        let pending = futures_util::stream::pending::<Result<Bytes, std::io::Error>>();
+        let request = Request::new(axum::body::Body::from_stream(pending));
+        let mut runtime = tokio::runtime::Builder::new_current_thread();
+        let runtime = runtime.enable_time().start_paused(true).build().expect("a runtime");
+        let asked = runtime.block_on(Asked::<PowerOrder>::from_request(request, &()));
+        let problem = asked.err().expect("no body");
+        assert_eq!(problem.status(), StatusCode::REQUEST_TIMEOUT);
     }
 
     #[test]

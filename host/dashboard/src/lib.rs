@@ -14,6 +14,7 @@
 
 mod api;
 mod assets;
+mod connections;
 mod feed;
 mod gate;
 mod merge_patch;

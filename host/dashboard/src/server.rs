@@ -5,6 +5,7 @@ use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use axum::Router;
 use axum::extract::{DefaultBodyLimit, Request, State};
@@ -12,13 +13,13 @@ use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE, SET_COOKIE};
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
-use axum::serve::ListenerExt;
 use codewheel_plant::Running;
 use tokio::sync::oneshot;
 use utoipa::openapi::{InfoBuilder, OpenApi};
 
 use crate::api::{self, BODY};
 use crate::assets;
+use crate::connections;
 use crate::feed::Feed;
 use crate::gate::{Gate, Pass};
 use crate::problem::Problem;
@@ -26,6 +27,13 @@ use crate::{Settings, StartError};
 
 /// Where the page is when nobody says where.
 const USUAL: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
+
+/// Commands and questions that wait for their buses at the same time: one for each stream of events,
+/// and as many besides.
+const WAITING: usize = 64;
+
+/// How long a page that closes waits for commands under way. Their buses end them a moment later.
+const PATIENCE: Duration = Duration::from_millis(300);
 
 /// What browsers are told with each answer.
 const HEADERS: [(HeaderName, &str); 5] = [
@@ -95,29 +103,32 @@ impl Dashboard {
     /// [`StartError::System`]; the plant runs on.
     pub fn serve(plant: Arc<Running>, port: Port) -> Result<Self, StartError> {
         let Port { listener, settings } = port;
+        let router = router(plant, settings, listener.local_addr()?)?;
+        Ok(Self::answer(listener, router)?)
+    }
+
+    /// Answers whoever connects to `listener`, in a thread.
+    fn answer(listener: TcpListener, router: Router) -> io::Result<Self> {
         let address = listener.local_addr()?;
-        let router = router(plant, settings, address)?;
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_io()
             .enable_time()
             .thread_name("page command")
-            .max_blocking_threads(8)
+            .max_blocking_threads(WAITING)
             .build()?;
-        let (stop, stopped) = oneshot::channel();
-        let serve = async move {
-            let listener = tokio::net::TcpListener::from_std(listener)?;
-            // An event is small, and somebody looks at it.
-            let listener = listener.tap_io(|stream| drop(stream.set_nodelay(true)));
-            axum::serve(listener, router).await
+        let listener = {
+            let _inside = runtime.enter();
+            tokio::net::TcpListener::from_std(listener)?
         };
+        let (stop, stopped) = oneshot::channel();
         let thread = std::thread::Builder::new().name("page".into()).spawn(move || {
             runtime.block_on(async {
                 tokio::select! {
-                    // It never ends by itself.
-                    _ = serve => {}
+                    () = connections::serve(listener, router) => {}
                     _ = stopped => {}
                 }
             });
+            runtime.shutdown_timeout(PATIENCE);
         })?;
         Ok(Self { address, stop: Some(stop), thread: Some(thread) })
     }
@@ -231,4 +242,41 @@ fn with_cookie(cookie: &str) -> Response {
         headers.insert(SET_COOKIE, cookie);
     }
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+    use std::net::TcpStream;
+    use std::sync::{Mutex, mpsc};
+    use std::time::Instant;
+
+    use super::*;
+    use axum::routing::get;
+
+    #[test]
+    fn a_page_that_closes_does_not_wait_for_a_command_under_way() {
+        let (begins, begun) = mpsc::channel();
+        let (answer, waits) = mpsc::channel::<()>();
+        let waits = Arc::new(Mutex::new(waits));
+        let command = move || {
+            let (begins, waits) = (begins.clone(), Arc::clone(&waits));
+            let wait = move || {
+                begins.send(()).expect("the test waits");
+                drop(waits.lock().map(|waits| waits.recv_timeout(Duration::from_secs(20))));
+            };
+            async { drop(tokio::task::spawn_blocking(wait).await) }
+        };
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a port");
+        listener.set_nonblocking(true).expect("it does not block");
+        let page = Dashboard::answer(listener, Router::new().route("/", get(command)));
+        let page = page.expect("a page");
+        let mut client = TcpStream::connect(page.address()).expect("it listens");
+        client.write_all(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n").expect("it listens");
+        begun.recv().expect("the command begins");
+        let begin = Instant::now();
+        drop(page);
+        assert!(begin.elapsed() < Duration::from_secs(10), "{:?}", begin.elapsed());
+        drop(answer);
+    }
 }

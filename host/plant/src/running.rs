@@ -198,6 +198,15 @@ struct Post {
     unanswered: Vec<Unanswered>,
 }
 
+impl Drop for Post {
+    fn drop(&mut self) {
+        // Whoever watches must not wait for a bus that has come to grief in a bug of ours.
+        if std::thread::panicking() {
+            self.board.end();
+        }
+    }
+}
+
 /// A bus in a thread.
 trait Served {
     fn command(&mut self, device: &str, command: &Command) -> Ticket;
@@ -492,5 +501,31 @@ impl Running {
 impl Drop for Running {
     fn drop(&mut self) {
         let _ = self.join();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_whose_thread_panics_is_a_lost_bus_to_all_who_watch() {
+        let board = Board::new(1);
+        let (_orders, waiting) = mpsc::sync_channel(1);
+        let post = Post {
+            board: Arc::clone(&board),
+            stop: Arc::default(),
+            place: 0,
+            clock: Clock::new(),
+            ears: Arc::new(Ears::new(None)),
+            orders: waiting,
+            unanswered: Vec::new(),
+        };
+        let thread = std::thread::spawn(move || {
+            let _post = post;
+            panic!("on purpose");
+        });
+        thread.join().expect_err("it panics");
+        assert!(board.has_ended());
     }
 }

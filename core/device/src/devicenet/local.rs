@@ -8,6 +8,7 @@
 use core::fmt;
 
 use codewheel_devicenet::explicit::{Error, Service};
+use codewheel_devicenet::{Application, Identity};
 use codewheel_encoder::{Block, Encoder, Refusal, Sensor};
 use codewheel_station::Instant;
 
@@ -41,6 +42,19 @@ impl fmt::Display for NotWritten {
 impl core::error::Error for NotWritten {}
 
 impl<S: Sensor> DeviceNetEncoder<S> {
+    /// What it says it is: Identity attributes 1 to 4, 6 and 7.
+    #[must_use]
+    pub fn identity(&self) -> Identity {
+        self.body.identity()
+    }
+
+    /// Identity attribute 5: bit 0, a master owns it; bit 2, configured; bit 8, minor recoverable
+    /// fault, a damaged memory.
+    #[must_use]
+    pub fn identity_status(&self) -> u16 {
+        self.server.identity_status(&self.body)
+    }
+
     /// The value of `row` as of the newest sample.
     #[must_use]
     pub fn read(&self, row: &Row) -> Value {

@@ -84,7 +84,7 @@ impl<const N: usize> fmt::Display for Text<N> {
     }
 }
 
-/// The value of a parameter, as its octets.
+/// A limit of a parameter, as its octets.
 pub type Value = Octets<8>;
 
 /// The elementary data type of a parameter (CIP volume 1, appendix C; the codes below 20h are those
@@ -130,11 +130,11 @@ impl DataType {
         matches!(self.0, 0x01..=0x0A | 0xC1..=0xC9 | 0xD1..=0xD4)
     }
 
-    /// `value` as a number; `None` where the type is no integer, or there is no value.
+    /// `octets` as a number; `None` where the type is no integer, or they are none or more than
+    /// eight.
     #[must_use]
-    pub fn number(self, value: &Value) -> Option<i128> {
-        let octets = value.as_slice();
-        if !self.is_integer() || octets.is_empty() {
+    pub fn number(self, octets: &[u8]) -> Option<i128> {
+        if !self.is_integer() || octets.is_empty() || octets.len() > 8 {
             return None;
         }
         let negative = self.is_signed() && octets.last().is_some_and(|octet| octet & 0x80 != 0);
@@ -151,11 +151,11 @@ impl DataType {
 pub struct Parameter {
     /// The instance number, from 1 on.
     pub number: u8,
-    /// Attribute 1, the value now.
-    pub value: Value,
+    /// Attribute 1, the value now, as long as a response can be: a text, perhaps.
+    pub value: Octets<255>,
     /// Attribute 3, the path of the attribute that this parameter is, such as `20 2F 24 01 30 07`.
     pub link: Octets<16>,
-    /// Attribute 4: bit 1 enumerated, 4 read only, 5 monitor.
+    /// Attribute 4: bit 1 enumerated, 2 scaled, 3 scaled by other parameters, 4 read only, 5 monitor.
     pub descriptor: u16,
     /// Attribute 5.
     pub data_type: DataType,
@@ -204,6 +204,12 @@ impl Parameter {
     #[must_use]
     pub const fn is_read_only(&self) -> bool {
         self.descriptor & 1 << 4 != 0
+    }
+
+    /// Whether its numbers are scaled for people (descriptor bit 2).
+    #[must_use]
+    pub const fn is_scaled(&self) -> bool {
+        self.descriptor & 1 << 2 != 0
     }
 
     /// Whether its values have names (descriptor bit 1).

@@ -84,6 +84,11 @@ impl Server {
         }
     }
 
+    /// Identity attribute 5: what the device says of itself, and whether a master owns it.
+    pub fn identity_status<A: Application>(&self, app: &A) -> u16 {
+        app.status() | if self.master.is_some() { OWNED } else { 0 }
+    }
+
     fn identity_attribute<A: Application>(
         &self,
         attribute: u8,
@@ -104,7 +109,7 @@ impl Server {
             2 => out.u16_le(device_type),
             3 => out.u16_le(product_code),
             4 => out.octets(&[major_revision, minor_revision]),
-            5 => out.u16_le(app.status() | if self.master.is_some() { OWNED } else { 0 }),
+            5 => out.u16_le(self.identity_status(app)),
             6 => out.u32_le(serial),
             7 => {
                 out.u8(product_name.len() as u8).and_then(|()| out.octets(product_name.as_bytes()))

@@ -63,9 +63,9 @@ fn each_full_instance_is_asked_for_all_its_attributes() {
     assert_eq!(second.number, 2);
     assert_eq!(second.link.as_slice(), [0x20, 0x2F, 0x24, 0x01, 0x30, 0x07]);
     assert_eq!(second.data_type.name(), Some("INT"));
-    assert_eq!(second.data_type.number(&second.value), Some(-2));
-    assert_eq!(second.data_type.number(&second.minimum), Some(-32768));
-    assert_eq!(second.data_type.number(&second.maximum), Some(32767));
+    assert_eq!(second.data_type.number(second.value.as_slice()), Some(-2));
+    assert_eq!(second.data_type.number(second.minimum.as_slice()), Some(-32768));
+    assert_eq!(second.data_type.number(second.maximum.as_slice()), Some(32767));
     assert_eq!((second.name.to_string(), second.units.to_string()), ("Speed".into(), "rpm".into()));
     assert_eq!(second.help.to_string(), "how fast??");
     assert_eq!((second.scaling, second.scaling_links), ([2, 1, 1, 1], [3, 1, 1, 1]));
@@ -96,7 +96,7 @@ fn stubs_are_asked_for_six_attributes_and_gaps_are_passed_over() {
     });
     assert_eq!(found.iter().map(|parameter| parameter.number).collect::<Vec<_>>(), [1, 3]);
     assert_eq!(asked.len(), 2 + 5 + 1 + 5);
-    assert_eq!(found[1].data_type.number(&found[1].value), Some(200));
+    assert_eq!(found[1].data_type.number(found[1].value.as_slice()), Some(200));
     assert!(found[1].name.is_empty());
 }
 
@@ -142,9 +142,9 @@ fn numbers_are_read_as_their_types_say() {
     });
     let value = found[0].value;
     assert_eq!(value.as_slice().len(), 8);
-    assert_eq!(DataType(0xC5).number(&value), Some(-1));
-    assert_eq!(DataType(0xC9).number(&value), Some(i128::from(u64::MAX)));
-    assert_eq!(DataType(0xCA).number(&value), None);
+    assert_eq!(DataType(0xC5).number(value.as_slice()), Some(-1));
+    assert_eq!(DataType(0xC9).number(value.as_slice()), Some(i128::from(u64::MAX)));
+    assert_eq!(DataType(0xCA).number(value.as_slice()), None);
     assert_eq!(DataType(0x77).name(), None);
 }
 

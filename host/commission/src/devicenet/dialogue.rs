@@ -323,16 +323,9 @@ impl<S: Seat<Station = Console>> Dialogue<S> {
         gone.ok_or_else(|| troubles::gone(tried, mac))
     }
 
-    /// Releases the slave after something went wrong, which is what people must hear; an end that
-    /// somebody wants waits for it.
+    /// Releases the slave after something went wrong, which is what people must hear.
     pub(super) fn abandon(&mut self, tried: &str, mac: MacId) {
-        self.wind_up();
         let _ = self.release(tried, mac);
-    }
-
-    /// What follows undoes what was begun, though an end is wanted.
-    pub(super) fn wind_up(&mut self) {
-        self.seat.wind_up();
     }
 
     /// Asks the explicit request `body` of a slave that was allocated.

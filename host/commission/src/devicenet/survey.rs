@@ -191,9 +191,6 @@ fn look_at<S: Seat<Station = Console>>(
     let asked = dialogue
         .allocate(&tried, SlaveSettings::explicit(mac))
         .and_then(|()| identity::identify(dialogue, &tried, mac));
-    if asked.is_err() {
-        dialogue.wind_up();
-    }
     // Whatever has come of it: a node that went away meanwhile is no reason to stop.
     let released = match dialogue.release(&tried, mac) {
         Err(trouble) if trouble.kind == Kind::Bus => Err(trouble),

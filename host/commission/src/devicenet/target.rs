@@ -106,6 +106,7 @@ impl Place<'_> {
                     )
                 }
             },
+            Reading::Real(real) => usage(format!("{real} is no integer"), "give one".to_owned()),
             Reading::Octets(octets) => {
                 let number = (octets.len() == self.octets).then(|| {
                     if self.is_signed { values::signed(octets) } else { values::unsigned(octets) }

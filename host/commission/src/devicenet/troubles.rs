@@ -152,6 +152,18 @@ pub(super) fn refused(tried: &str, error: Error) -> Trouble {
     Trouble::new(Kind::Refused, tried, format!("it answers {error}"), advice(error.general))
 }
 
+/// What was to be done is done, as far as the device says, and nobody saw it.
+pub(super) fn not_read_back(what: &str, trouble: Trouble) -> Trouble {
+    let Trouble { kind, tried, came, .. } = trouble;
+    let kind = if kind == Kind::Refused { Kind::Differs } else { kind };
+    Trouble::new(
+        kind,
+        format!("{tried} and see that it is so"),
+        format!("{what} was written and taken, and could not be read back: {came}"),
+        "it is in force; read it another way, such as with `codewheel get`, before you rely on it",
+    )
+}
+
 /// What to do about a general status.
 const fn advice(status: GeneralStatus) -> &'static str {
     match status {

@@ -2,10 +2,10 @@
 
 use codewheel_device::devicenet::rows::{DataType, Row, Source};
 use codewheel_devicenet::explicit::Path;
-use codewheel_devicenet::scanner::Parameter;
+use codewheel_devicenet::scanner::{DataType as ParameterType, Parameter};
 
 use super::objects::{Attribute, Form};
-use crate::{Reading, Value};
+use crate::{Reading, Real, Value};
 
 /// The attribute whose write is the preset function: an act, though its row is a parameter.
 pub(super) const PRESET: u8 = 10;
@@ -128,7 +128,7 @@ pub(super) fn of_attribute(attribute: &Attribute, octets: &[u8]) -> Value {
     let reading = reading.unwrap_or_else(|| Reading::Octets(octets.to_vec()));
     let label = match &reading {
         Reading::Number(number) => label(attribute.values, *number),
-        Reading::Text(_) | Reading::Octets(_) => None,
+        Reading::Real(_) | Reading::Text(_) | Reading::Octets(_) => None,
     };
     Value {
         name: attribute.key.to_owned(),
@@ -173,15 +173,73 @@ pub(super) fn of_path(path: Path, octets: &[u8]) -> Value {
 /// Descriptor bit 5 of a parameter: it changes by itself, so it is a reading.
 const MONITOR: u16 = 1 << 5;
 
+/// The codes of data types, old and new (CIP volume 1, appendix C).
+const SHORT_STRING: u8 = 0xDA;
+const REAL: [u8; 2] = [0xCA, 0x0B];
+const LREAL: [u8; 2] = [0xCB, 0x0C];
+
+/// What the octets of a type are.
+fn of_type(data_type: ParameterType, octets: &[u8]) -> Reading {
+    let reading = match *octets {
+        _ if data_type.0 == SHORT_STRING => Some(Reading::Text(short_string(octets))),
+        [a, b, c, d] if REAL.contains(&data_type.0) => {
+            Some(Reading::Real(Real::Single(f32::from_le_bytes([a, b, c, d]))))
+        }
+        [a, b, c, d, e, f, g, h] if LREAL.contains(&data_type.0) => {
+            Some(Reading::Real(Real::Double(f64::from_le_bytes([a, b, c, d, e, f, g, h]))))
+        }
+        _ => data_type.number(octets).and_then(|it| i64::try_from(it).ok()).map(Reading::Number),
+    };
+    reading.unwrap_or_else(|| Reading::Octets(octets.to_vec()))
+}
+
+/// The octets of a text or a number with a fraction; `None` where the type takes no such thing.
+pub(super) fn to_type(data_type: ParameterType, reading: &Reading) -> Option<Vec<u8>> {
+    if data_type.0 == SHORT_STRING {
+        let Reading::Text(text) = reading else { return None };
+        let characters = text.chars().map(|it| u8::try_from(u32::from(it)).ok());
+        let characters: Vec<u8> = characters.collect::<Option<_>>()?;
+        let length = u8::try_from(characters.len()).ok()?;
+        return Some(std::iter::once(length).chain(characters).collect());
+    }
+    let number = match reading {
+        Reading::Number(number) => *number as f64,
+        Reading::Real(real) => real.number(),
+        Reading::Text(_) | Reading::Octets(_) => return None,
+    };
+    if REAL.contains(&data_type.0) {
+        Some((number as f32).to_le_bytes().to_vec())
+    } else if LREAL.contains(&data_type.0) {
+        Some(number.to_le_bytes().to_vec())
+    } else {
+        None
+    }
+}
+
+/// What a scaled number means in its unit, with the number itself: (raw + offset) × multiplier × base
+/// ÷ divisor (CIP volume 1, chapter 5-14). `None` where that is the number, or a device divides by 0.
+pub(super) fn scaled(raw: i64, scaling: [i64; 4], decimals: u8) -> Option<String> {
+    let [multiplier, divisor, base, offset] = scaling;
+    if divisor == 0 || (offset == 0 && multiplier.saturating_mul(base) == divisor) {
+        return None;
+    }
+    let value = (raw as f64 + offset as f64) * multiplier as f64 * base as f64 / divisor as f64;
+    let shown = match decimals.min(9) {
+        // Some leave the decimals at zero, though what they mean has a fraction.
+        0 => value.to_string(),
+        decimals => format!("{value:.places$}", places = decimals.into()),
+    };
+    Some(format!("{shown} (raw {raw})"))
+}
+
 /// The value of a parameter, in the words of the device. `label` is the name of the value.
 pub(super) fn of_parameter(parameter: &Parameter, label: Option<String>) -> Value {
-    let number = |value| {
-        let number = parameter.data_type.number(value)?;
+    let number = |octets| {
+        let number = parameter.data_type.number(octets)?;
         i64::try_from(number).ok()
     };
-    let reading = number(&parameter.value)
-        .map_or_else(|| Reading::Octets(parameter.value.as_slice().to_vec()), Reading::Number);
-    let range = number(&parameter.minimum).zip(number(&parameter.maximum));
+    let reading = of_type(parameter.data_type, parameter.value.as_slice());
+    let range = number(parameter.minimum.as_slice()).zip(number(parameter.maximum.as_slice()));
     let place = match *parameter.link.as_slice() {
         [0x20, class, 0x24, instance, 0x30, attribute] => {
             format!("0Fh/{}, which is {class:02X}h/{instance}/{attribute}", parameter.number)
@@ -249,6 +307,15 @@ mod tests {
         assert_eq!(assembly(&[0x20, 0x04, 0x24, 2]), Some(2));
         assert_eq!(assembly(&[0x20, 0x04, 0x24, 1, 0x30, 3]), Some(1));
         assert_eq!(assembly(&[0x20, 0x05, 0x24, 1]), None);
+    }
+
+    #[test]
+    fn scaled_numbers_are_told_in_their_unit_with_the_number_itself() {
+        assert_eq!(scaled(237, [1, 10, 1, 0], 1).as_deref(), Some("23.7 (raw 237)"));
+        assert_eq!(scaled(5, [3, 2, 1, -1], 0).as_deref(), Some("6 (raw 5)"));
+        assert_eq!(scaled(5, [3, 2, 1, 0], 0).as_deref(), Some("7.5 (raw 5)"));
+        assert_eq!(scaled(5, [2, 2, 1, 0], 1), None);
+        assert_eq!(scaled(5, [1, 0, 1, 0], 1), None);
     }
 
     #[test]

@@ -64,6 +64,7 @@ pub(super) fn told(reading: Option<&Reading>) -> String {
     match reading {
         None => "nothing".to_owned(),
         Some(Reading::Number(number)) => number.to_string(),
+        Some(Reading::Real(real)) => real.to_string(),
         Some(Reading::Text(text)) => text.clone(),
         Some(Reading::Octets(octets)) => super::project::hex(octets),
     }
@@ -77,6 +78,7 @@ pub(super) fn optional<S: Serializer>(
     match reading {
         None => serializer.serialize_none(),
         Some(Reading::Number(number)) => serializer.serialize_some(number),
+        Some(Reading::Real(real)) => serializer.serialize_some(&real.number()),
         Some(Reading::Text(text)) => serializer.serialize_some(text),
         Some(Reading::Octets(octets)) => serializer.serialize_some(octets),
     }

@@ -110,7 +110,7 @@ fn configuration(values: &[Value]) -> Option<Vec<u8>> {
     match &find(values, CONFIGURATION)?.reading {
         Reading::Octets(octets) => Some(octets.clone()),
         Reading::Number(identifier) => Some(vec![u8::try_from(*identifier).ok()?]),
-        Reading::Text(_) => None,
+        Reading::Real(_) | Reading::Text(_) => None,
     }
 }
 

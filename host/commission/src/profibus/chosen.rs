@@ -98,7 +98,7 @@ pub(super) fn number_for(row: &Row, reading: &Reading) -> Result<u32, String> {
             .zip(row.values)
             .find_map(|(value, name)| name.eq_ignore_ascii_case(text).then_some(value))
             .or_else(|| text.parse().ok()),
-        Reading::Octets(_) => None,
+        Reading::Real(_) | Reading::Octets(_) => None,
     };
     let fits = |number: &u32| !matches!(row.field, Field::Bit(_)) || *number <= 1;
     number.filter(fits).ok_or_else(possible)

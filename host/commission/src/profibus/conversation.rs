@@ -307,7 +307,6 @@ impl<S: Seat<Station = Console>> Conversation<S> {
 
     /// Leaves the bus, whatever went wrong before: that is what there is to hear of.
     pub(super) fn abandon(&mut self) {
-        self.seat.wind_up();
         let _ = self.leave();
     }
 

@@ -14,7 +14,7 @@ use super::identity::Told;
 use super::{
     Acyclic, Answer, Console, Diagnosis, Event, HIGHEST_ADDRESS, ScanSettings, SlaveState,
 };
-use crate::{Kind, Progress, Reading, Seat, Session, Trouble};
+use crate::{Kind, Progress, Reading, Seat, Trouble};
 
 /// How a session is opened.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -111,9 +111,9 @@ impl<S: Seat<Station = Console>> Encoder<S> {
             Self { conversation, address, standing: Standing::Foreign, sampled: Instant::ZERO };
         let opened = session.begin(&tried, settings, &overrides);
         if opened.is_err() {
-            session.conversation.seat.wind_up();
             // What went wrong before is the one to hear of.
-            let _ = session.release();
+            let _ = session.let_go(&tried);
+            let _ = session.conversation.leave();
         }
         opened.map(|()| session)
     }
@@ -268,6 +268,18 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         Ok(exchanges.unwrap_or(BroughtUp::Silent))
     }
 
+    /// Ends the service of the slave, if it is served, and unlocks it for its own master.
+    fn let_go(&mut self, tried: &str) -> Result<(), Trouble> {
+        let address = self.address;
+        let Some(master) = self.conversation.console().master_mut() else { return Ok(()) };
+        let is_served = master.slave(address).is_some();
+        master.stop();
+        if is_served {
+            self.conversation.ask(tried, address, Acyclic::Unlock)?;
+        }
+        Ok(())
+    }
+
     /// Makes notices of what the master tells.
     fn take_events(&mut self) {
         while let Some(event) =
@@ -341,6 +353,7 @@ fn no_parameter(tried: &str, key: &str) -> Trouble {
 fn told(reading: &Reading) -> String {
     match reading {
         Reading::Number(number) => number.to_string(),
+        Reading::Real(real) => real.to_string(),
         Reading::Text(text) => text.clone(),
         Reading::Octets(octets) => {
             octets.iter().map(|octet| format!("{octet:02X}")).collect::<Vec<_>>().join(" ")

@@ -119,19 +119,24 @@ fn ask_all<S: Seat<Station = Console>>(
         return Err(trouble);
     }
     conversation.join(tried)?;
-    let asked = ask_in_ring(conversation, tried, progress);
-    if asked.is_err() {
-        conversation.abandon();
+    let asked = ask_each(conversation, progress);
+    let left = conversation.leave();
+    let (all, done, open) = asked?;
+    left?;
+    if done == open {
+        return Ok(all);
     }
-    asked
+    let came = format!("the token did not come back after {done} of {open} requests");
+    let remedy = "try again; on a busy line try another master address";
+    Err(Trouble::new(Kind::TimeOut, tried, came, remedy))
 }
 
-/// Asks every address as a member of the ring, and leaves it.
-fn ask_in_ring<S: Seat<Station = Console>>(
+/// Asks every address while it has the token; what they said, and how many of how many requests were
+/// answered or given up.
+fn ask_each<S: Seat<Station = Console>>(
     conversation: &mut Conversation<S>,
-    tried: &str,
     progress: &mut dyn FnMut(Progress),
-) -> Result<BTreeMap<u8, Said>, Trouble> {
+) -> Result<(BTreeMap<u8, Said>, u64, u64), Trouble> {
     let own = conversation.settings.address;
     let addresses = (0..=HIGHEST_ADDRESS).filter(|address| *address != own);
     let mut open = 0;
@@ -177,14 +182,7 @@ fn ask_in_ring<S: Seat<Station = Console>>(
             percent: percent(done, open),
         });
     }
-    let is_whole = done == open;
-    conversation.leave()?;
-    if is_whole {
-        return Ok(all);
-    }
-    let came = format!("the token did not come back after {done} of {open} requests");
-    let remedy = "try again; on a busy line try another master address";
-    Err(Trouble::new(Kind::TimeOut, tried, came, remedy))
+    Ok((all, done, open))
 }
 
 /// Everybody who was heard, or answered.

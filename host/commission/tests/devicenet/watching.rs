@@ -26,6 +26,25 @@ fn each_position_is_newer_than_the_one_before() {
 }
 
 #[test]
+fn the_encoder_stays_ours_while_polls_begin_and_end() {
+    let mut seat = turning("still");
+    let mut session = seat.open(5).unwrap();
+    session.sample().unwrap();
+    session.value(&key("poll-assembly")).unwrap();
+    session.sample().unwrap();
+    drop(session);
+    let ours = seat.ours();
+    let of_explicit = |frame: &&String| {
+        frame.starts_with("42E#") || frame.contains("4B030101") || frame.contains("4B030103")
+    };
+    let seen: Vec<&String> = ours.iter().filter(of_explicit).collect();
+    // Allocated once; then polls are released, which it hears on either port.
+    let [allocated, released] = seen.as_slice() else { panic!("{seen:#?}") };
+    assert!(allocated.ends_with("4B0301013E") && released.ends_with("4C030102"), "{seen:#?}");
+    assert_eq!(seat.held(5), 3);
+}
+
+#[test]
 fn flags_are_asked_for_where_polls_do_not_bring_them() {
     let mut seat = turning("still");
     let mut session = seat.open(5).unwrap();

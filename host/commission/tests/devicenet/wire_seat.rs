@@ -1,8 +1,8 @@
 //! A seat on a wire in virtual time, with whatever else the test attaches.
 
 use std::cell::Cell;
+use std::fmt;
 use std::rc::Rc;
-use std::{fmt, io};
 
 use codewheel_commission::devicenet::{Console, Encoder, OpenSettings};
 use codewheel_commission::{Progress, Reading, Seat, Session, Trouble};
@@ -17,7 +17,7 @@ use codewheel_station::can::{BitRate, Filter, Frame, Identifier};
 use codewheel_station::{Duration, Instant};
 
 use crate::liar::Liar;
-use crate::toy::Toy;
+use crate::toy::{Drive, Toy};
 
 pub(crate) type Device = DeviceNetEncoder<Shaft>;
 pub(crate) type Node = Either<Console, Either<Device, Either<Scanner, Either<Toy, Liar>>>>;
@@ -46,8 +46,12 @@ pub(crate) struct WireSeat {
     pub(crate) frames: Vec<(Instant, NodeId, Frame)>,
     /// Whether the port says that it is lost for good.
     pub(crate) is_lost: bool,
-    /// After how many turns somebody wants an end, until it is wound up.
+    /// After how many turns somebody wants an end, which is said once.
     pub(crate) turns_left: Rc<Cell<Option<u32>>>,
+    /// Whether the next turn fails because a person wants an end.
+    is_interrupted: bool,
+    /// So many frames after this address was allocated it does.
+    interruption: Option<(u8, usize)>,
     /// Whether the memories of encoders take what they are given, and how long that lasts.
     pub(crate) has_memory: bool,
     pub(crate) memory_time: Duration,
@@ -65,6 +69,8 @@ impl WireSeat {
             frames: Vec::new(),
             is_lost: false,
             turns_left: Rc::default(),
+            is_interrupted: false,
+            interruption: None,
             has_memory: true,
             memory_time: Duration::ZERO,
             agenda: Vec::new(),
@@ -112,6 +118,12 @@ impl WireSeat {
         self.wire.attach("toy", node, &filter, false)
     }
 
+    pub(crate) fn drive(&mut self, id: NodeId) -> &Drive {
+        let node = self.wire.node_mut(id).and_then(Either::right_mut);
+        let node = node.and_then(Either::right_mut).and_then(Either::right_mut);
+        &node.and_then(Either::left_mut).expect("a toy that was not detached").drive
+    }
+
     pub(crate) fn liar(&mut self, liar: Liar) {
         let node = Either::Right(Either::Right(Either::Right(Either::Right(liar))));
         self.wire.attach("liar", node, &[Filter::ALL], false);
@@ -133,6 +145,25 @@ impl WireSeat {
         let at = self.wire.now() + span;
         let place = self.agenda.partition_point(|(other, _)| *other > at);
         self.agenda.insert(place, (at, Box::new(act)));
+    }
+
+    /// Has a person want an end so many frames after the encoder at `address` was allocated.
+    pub(crate) fn interrupt_after_allocation(&mut self, address: u8, frames: usize) {
+        self.interruption = Some((address, frames));
+    }
+
+    fn interrupt(&mut self) {
+        let Some((address, frames)) = self.interruption else { return };
+        let answers = format!("{:03X}#", 0x400 | u16::from(address) << 3 | 3);
+        let place = self.frames.iter().position(|(_, _, frame)| {
+            let frame = frame.to_string();
+            // CB: the response to Allocate.
+            frame.starts_with(&answers) && frame.get(6..8) == Some("CB")
+        });
+        if place.is_some_and(|place| self.frames.len() > place + frames) {
+            self.is_interrupted = true;
+            self.interruption = None;
+        }
     }
 
     /// Lets `span` pass.
@@ -236,18 +267,17 @@ impl Seat for WireSeat {
             let reason = "the other side closed it".to_owned();
             return Err(LinkError::Lost { bus: "slcan:127.0.0.1:4001".to_owned(), reason });
         }
-        match self.turns_left.get() {
-            Some(0) => return Err(LinkError::System(io::ErrorKind::Interrupted.into())),
-            turns => self.turns_left.set(turns.map(|turns| turns - 1)),
+        if self.turns_left.get() == Some(0) {
+            self.turns_left.set(None);
+            return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
+        }
+        self.turns_left.set(self.turns_left.get().map(|turns| turns - 1));
+        self.interrupt();
+        if std::mem::take(&mut self.is_interrupted) {
+            return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
         }
         self.step(until);
         Ok(Vec::new())
-    }
-
-    fn wind_up(&mut self) {
-        if self.turns_left.get() == Some(0) {
-            self.turns_left.set(None);
-        }
     }
 }
 

@@ -55,11 +55,12 @@ pub(crate) struct Bench {
     pub(crate) said: u64,
     /// What the console sent as outputs to whom, each once in a row.
     pub(crate) outputs: Vec<Vec<u8>>,
+    /// How many telegrams of the console a person lets pass before they want an end.
+    pub(crate) patience: Option<u64>,
     /// Who is unplugged, and when.
     unplugs: Option<(Instant, u8)>,
     /// When a person wants an end.
     interrupts: Option<fn(&Self) -> bool>,
-    is_interrupted: bool,
 }
 
 impl std::fmt::Debug for Bench {
@@ -104,9 +105,9 @@ impl Bench {
             complaints: Vec::new(),
             said: 0,
             outputs: Vec::new(),
+            patience: None,
             unplugs: None,
             interrupts: None,
-            is_interrupted: false,
         }
     }
 
@@ -306,19 +307,15 @@ impl Seat for Bench {
     }
 
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
-        if self.interrupts.is_some_and(|is_so| is_so(self)) {
+        let is_wanted = self.interrupts.is_some_and(|is_so| is_so(self));
+        if is_wanted {
             self.interrupts = None;
-            self.is_interrupted = true;
         }
-        if self.is_interrupted {
+        if is_wanted || self.patience.take_if(|patience| *patience < self.said).is_some() {
             return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
         }
         self.step(until);
         Ok(Vec::new())
-    }
-
-    fn wind_up(&mut self) {
-        self.is_interrupted = false;
     }
 }
 

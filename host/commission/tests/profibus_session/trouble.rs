@@ -1,7 +1,7 @@
 //! What goes wrong on the way.
 
 use codewheel_commission::profibus::{MasterSettings, SessionSettings};
-use codewheel_commission::{Kind, Name, Reading, Session};
+use codewheel_commission::{Kind, Name, Reading, Seat, Session};
 use codewheel_station::Duration;
 use codewheel_station::rs485::BaudRate;
 
@@ -106,4 +106,34 @@ fn a_slave_that_says_no_more_is_told_after_two_seconds_or_longer_at_slow_rates()
         session.release().unwrap();
         assert!(session.now().since(told) < Duration::from_millis(500), "{rate}");
     }
+}
+
+#[test]
+fn whoever_is_interrupted_while_opening_lets_the_slave_go_and_falls_silent() {
+    let mut interrupted = 0;
+    for telegrams in 0.. {
+        let mut bench = Bench::new().with(7, "amg11-p29");
+        bench.patience = Some(telegrams);
+        let Err(trouble) = bench.open(7, &alone()).map(drop) else { break };
+        assert_eq!(trouble.kind, Kind::Bus, "{trouble}");
+        interrupted += 1;
+        let said = bench.said;
+        // Long before its watchdog would let it go.
+        bench.run(Duration::from_millis(100));
+        assert_eq!(bench.said, said, "{telegrams}");
+        let snapshot = bench.device(7).snapshot(bench.now());
+        let master = snapshot.profibus().and_then(|state| state.master);
+        assert_eq!(master, None, "after {telegrams} telegrams");
+    }
+    assert!(interrupted > 5, "{interrupted}");
+}
+
+#[test]
+fn whoever_is_interrupted_while_scanning_falls_silent() {
+    let mut bench = Bench::new().with(7, "amg11-p29");
+    bench.patience = Some(40);
+    bench.scan(quick(RATE)).unwrap_err();
+    let said = bench.said;
+    bench.run(Duration::from_secs(1));
+    assert_eq!(bench.said, said);
 }

@@ -96,7 +96,17 @@ impl Page {
     /// What the plant is without its page: nobody else may hold it then.
     pub(crate) fn close(self) -> Running {
         drop(self.dashboard);
-        Arc::into_inner(self.plant).expect("the page has let go of the plant")
+        let deadline = Instant::now() + PATIENCE;
+        let mut plant = self.plant;
+        loop {
+            // A question under way lets go of it when its bus answers.
+            match Arc::try_unwrap(plant) {
+                Ok(running) => return running,
+                Err(held) => plant = held,
+            }
+            assert!(Instant::now() < deadline, "the page holds the plant");
+            std::thread::yield_now();
+        }
     }
 
     /// Sends a request as it stands, with line feeds as people write them.

@@ -1,6 +1,7 @@
 //! Who is not let in, over the wire; the rules one by one stand beside the gate.
 
-use std::net::SocketAddr;
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
 
 use codewheel_dashboard::{Dashboard, Settings, StartError};
 
@@ -176,4 +177,22 @@ fn the_33rd_stream_is_refused_and_there_is_room_when_one_closes() {
         }
     }
     panic!("a stream that was closed is still counted");
+}
+
+#[test]
+fn who_connects_when_all_connections_are_taken_waits_until_one_is_free() {
+    let page = Page::start();
+    let mut idle: Vec<_> =
+        (0..128).map(|_| TcpStream::connect(page.address()).expect("a connection")).collect();
+    let mut late = TcpStream::connect(page.address()).expect("a connection");
+    let head = format!("GET /api/v1/plant HTTP/1.1\r\nHost: {}\r\n\r\n", page.address());
+    late.write_all(head.as_bytes()).expect("it is taken");
+    let waits = std::time::Duration::from_millis(200);
+    late.set_read_timeout(Some(waits)).expect("a time-out");
+    let mut answer = [0; 12];
+    late.read_exact(&mut answer).expect_err("there is no room");
+    idle.pop();
+    late.set_read_timeout(None).expect("no time-out");
+    late.read_exact(&mut answer).expect("there is room");
+    assert_eq!(&answer, b"HTTP/1.1 200");
 }

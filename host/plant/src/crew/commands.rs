@@ -161,7 +161,9 @@ impl<B: FieldBus> Crew<B> {
         medium: &mut impl Medium<B>,
     ) -> Result<(Begun, Option<(usize, u8)>), Refusal> {
         let done = match command {
-            Command::TurnBy(steps) => self.turn(now, place, medium, |_, left| steps + left),
+            Command::TurnBy(steps) => {
+                self.turn(now, place, medium, |_, left| steps.saturating_add(left))
+            }
             Command::TurnTo(code) => self.turn_to(now, place, *code, medium),
             Command::Motion(text) => self.set_motion(now, place, text, medium),
             Command::Stop => self.hold(now, place, medium),
@@ -230,7 +232,10 @@ impl<B: FieldBus> Crew<B> {
         let was_on = hand.unplugged.is_none();
         hand.switched_off = !on;
         let (done, what) = if on {
-            hand.cut = false;
+            if std::mem::take(&mut hand.cut) {
+                // It is over now, and not once more when it would have been.
+                self.agenda.forget_end(place, &Lever::PowerCut(Duration::ZERO));
+            }
             self.give_power(now, place, medium);
             ("the device has power", "the power is switched on")
         } else {

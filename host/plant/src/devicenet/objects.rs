@@ -18,7 +18,10 @@ pub(super) fn objects<S: Sensor>(
             title: "Encoder Position object, class 2Fh instance 1",
             objects: ROWS.iter().map(|row| object(row, encoder)).collect(),
         },
-        ObjectGroup { title: "Identity object, class 01h instance 1", objects: identity(outfit) },
+        ObjectGroup {
+            title: "Identity object, class 01h instance 1",
+            objects: identity(outfit, encoder),
+        },
     ]
 }
 
@@ -61,38 +64,46 @@ fn value(value: RowValue) -> Value {
     }
 }
 
-/// The Identity object as the stack answers it (AMG manual §7).
-fn identity(outfit: &Outfit<DeviceNet>) -> Vec<Object> {
+/// The Identity object as the stack answers it (AMG manual §5); without power, what the factory has
+/// put into the device.
+fn identity<S: Sensor>(
+    outfit: &Outfit<DeviceNet>,
+    encoder: Option<&DeviceNetEncoder<S>>,
+) -> Vec<Object> {
     let product = outfit.product;
     let Factory { vendor, device_type, serial } = Factory::with_serial(outfit.serial);
-    let number = |number: u32| Value::Number(number.into());
+    let revision = encoder.map(DeviceNetEncoder::identity).map(|identity| {
+        Value::Text(format!("{}.{}", identity.major_revision, identity.minor_revision))
+    });
+    let status = encoder.map(|encoder| Value::Number(encoder.identity_status().into()));
+    let number = |number: u32| Some(Value::Number(number.into()));
+    let name = Some(Value::Text(product.product_name.to_owned()));
+    let says = "What the device says it is";
+    let states = "Bit 0: a master owns the device. Bit 2: it is configured. Bit 8: its memory is \
+                  damaged";
     let rows = [
-        (1, "vendor", "Vendor ID", "UINT", number(vendor.into())),
-        (2, "device-type", "Device type", "UINT", number(device_type.into())),
-        (3, "product-code", "Product code", "UINT", number(product.product_code().into())),
-        (6, "serial-number", "Serial number", "UDINT", number(serial)),
-        (
-            7,
-            "product-name",
-            "Product name",
-            "SHORT_STRING",
-            Value::Text(product.product_name.to_owned()),
-        ),
+        (1, "vendor", "Vendor ID", "UINT", says, number(vendor.into())),
+        (2, "device-type", "Device type", "UINT", says, number(device_type.into())),
+        (3, "product-code", "Product code", "UINT", says, number(product.product_code().into())),
+        (4, "revision", "Revision", "2 USINT", says, revision),
+        (5, "status", "Status", "WORD", states, status),
+        (6, "serial-number", "Serial number", "UDINT", says, number(serial)),
+        (7, "product-name", "Product name", "SHORT_STRING", says, name),
     ];
     rows.into_iter()
-        .map(|(attribute, key, title, data_type, value)| Object {
+        .map(|(attribute, key, title, data_type, help, value)| Object {
             key: key.to_owned(),
             place: format!("01h/1/{attribute}"),
             title,
             data_type,
             unit: "",
-            help: "What the device says it is",
+            help,
             note: "",
             setting: false,
-            why_not: Some("the factory has set it".to_owned()),
+            why_not: Some("the device tells it".to_owned()),
             range: None,
             values: &[],
-            value: Some(value),
+            value,
             saved: None,
         })
         .collect()

@@ -103,8 +103,12 @@ fn turns_in_a_row_add_up_and_to_a_code_the_shaft_goes_the_shorter_way() {
     let refusal = order(&mut bus, &mut moment, &Command::TurnTo(last + 1)).unwrap_err();
     assert_eq!(refusal.cause, Cause::Value);
     assert!(refusal.text.contains(&format!("0 to {last}")), "{refusal}");
-    let refusal = order(&mut bus, &mut moment, &Command::TurnBy(i64::MIN)).unwrap_err();
-    assert!(refusal.text.contains("65536 turns at most"), "{refusal}");
+    for (far, way) in [(1_000_000, i64::MAX), (-1_000_000, i64::MIN)] {
+        order(&mut bus, &mut moment, &Command::TurnBy(far)).unwrap();
+        // What is left of the turn before adds to it.
+        let refusal = order(&mut bus, &mut moment, &Command::TurnBy(way)).unwrap_err();
+        assert!(refusal.text.contains("65536 turns at most"), "{refusal}");
+    }
 }
 
 #[test]
@@ -268,7 +272,11 @@ fn somebody_who_switches_off_is_not_overruled_by_the_plan() {
     assert!(!power(&mut bus, 3_100));
     moment = 3_100;
     order(&mut bus, &mut moment, &Command::Power(true)).unwrap();
-    assert!(power(&mut bus, 3_101) && power(&mut bus, 6_000));
+    assert!(power(&mut bus, 3_101));
+    let later = at(&mut bus, 6_000);
+    assert!(device(&later, "drive").state.power);
+    let told = told(&later, "drive");
+    assert!(!told.iter().any(|text| text.contains("fault over")), "it was over before: {told:?}");
 }
 
 #[test]
@@ -538,4 +546,19 @@ fn a_master_finds_a_device_at_the_address_that_it_was_moved_to() {
     let drive = device(&snapshot, "drive");
     assert_eq!((drive.address, drive.state.connection, drive.state.master), (9, "polled", Some(0)));
     assert_eq!(drive.served_by.as_deref(), Some("scanner at 0"));
+}
+
+#[test]
+fn the_identity_tells_its_revision_and_status_while_there_is_power() {
+    let mut bus = devicenet("");
+    let mut moment = 3_000;
+    at(&mut bus, moment);
+    assert_eq!(object(&bus, "revision").value, Some(Value::Text("1.1".into())));
+    assert_eq!(number(&bus, "status"), 0b001, "owned");
+    order(&mut bus, &mut moment, &write("cos-delta", 5)).unwrap();
+    order(&mut bus, &mut moment, &Command::Save).unwrap();
+    assert_eq!(number(&bus, "status"), 0b101, "owned and configured");
+    order(&mut bus, &mut moment, &Command::Power(false)).unwrap();
+    assert_eq!(object(&bus, "status").value, None);
+    assert_eq!(number(&bus, "vendor"), 468);
 }

@@ -4,8 +4,15 @@ use codewheel_plant::{AnyBusPlan, FieldBus, Plant, SlaveState, VirtualBus};
 
 use super::{at, device, example, only_bus, plant};
 
-const EXAMPLES: [&str; 5] =
-    ["demo.toml", "commissioning.toml", "faults.toml", "profibus.toml", "profibus-faults.toml"];
+const EXAMPLES: [&str; 7] = [
+    "demo.toml",
+    "bench.toml",
+    "commissioning.toml",
+    "faults.toml",
+    "hundred.toml",
+    "profibus.toml",
+    "profibus-faults.toml",
+];
 
 #[test]
 fn the_printed_plant_reads_back_to_the_same_plant_and_text() {

@@ -104,7 +104,6 @@ impl<S: Seat<Station = Console>> Encoder<S> {
             Ok(result)
         });
         if result.is_err() {
-            self.dialogue.wind_up();
             let _ = self.serve(tried, &release, ANSWER_TIME);
         }
         result

@@ -244,7 +244,8 @@ impl<S: Seat<Station = Console>> Session for Encoder<S> {
             }
         }
         self.note_change();
-        self.target_value(&tried, target)
+        let written = self.target_value(&tried, target);
+        written.map_err(|trouble| troubles::not_read_back("it", trouble))
     }
 
     /// The position is read back by a message of its own, with its flags.
@@ -255,7 +256,8 @@ impl<S: Seat<Station = Console>> Session for Encoder<S> {
             self.write_row(&tried, row, &Reading::Number(position.into()))?;
         }
         self.note_change();
-        watch::ask(&mut self.dialogue, &tried, self.mac)
+        let read = watch::ask(&mut self.dialogue, &tried, self.mac);
+        read.map_err(|trouble| troubles::not_read_back(&position.to_string(), trouble))
     }
 
     fn save(&mut self) -> Result<(), Trouble> {

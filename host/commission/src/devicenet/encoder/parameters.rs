@@ -31,7 +31,10 @@ impl<S: Seat<Station = Console>> Encoder<S> {
             };
             if let Walked::Parameter(parameter) = walk.take(response) {
                 let parameter = *parameter;
-                let label = self.enum_string(tried, &parameter)?;
+                let label = match self.enum_string(tried, &parameter)? {
+                    None => self.scaled(tried, &parameter)?,
+                    label => label,
+                };
                 see(&parameter, label);
             }
         }
@@ -44,13 +47,36 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         tried: &str,
         parameter: &Parameter,
     ) -> Result<Option<String>, Trouble> {
-        let number = parameter.data_type.number(&parameter.value);
+        let number = parameter.data_type.number(parameter.value.as_slice());
         let value = number.and_then(|number| u8::try_from(number).ok());
         let Some(value) = value.filter(|_| parameter.is_enumerated()) else { return Ok(None) };
         let body = [Service::GET_ENUM_STRING.0, PARAMETER, parameter.number, value];
         let octets = self.serve(tried, &body, ANSWER_TIME)?;
         let name = octets.ok().map(|octets| values::short_string(&octets));
         Ok(name.filter(|name| !name.is_empty()))
+    }
+
+    /// What a scaled parameter means in its unit. Its scaling may be values of other parameters.
+    fn scaled(&mut self, tried: &str, parameter: &Parameter) -> Result<Option<String>, Trouble> {
+        let number = parameter.data_type.number(parameter.value.as_slice());
+        let raw = number.and_then(|number| i64::try_from(number).ok());
+        let Some(raw) = raw.filter(|_| parameter.is_scaled()) else { return Ok(None) };
+        let [multiplier, divisor, base, offset] = parameter.scaling;
+        let offset = i64::from(offset.cast_signed());
+        let mut scaling = [multiplier.into(), divisor.into(), base.into(), offset];
+        for (value, link) in scaling.iter_mut().zip(parameter.scaling_links) {
+            let Some(instance) = u8::try_from(link).ok().filter(|instance| *instance != 0) else {
+                continue;
+            };
+            let path = Path { class: PARAMETER, instance, attribute: 1 };
+            let octets = match self.dialogue.get(tried, self.mac, path)? {
+                Answer::Done(octets) => values::signed(&octets),
+                Answer::Refused(_) | Answer::TooLong => None,
+            };
+            let Some(linked) = octets else { return Ok(None) };
+            *value = linked;
+        }
+        Ok(values::scaled(raw, scaling, parameter.decimals))
     }
 
     /// Parameter `number`.
@@ -79,16 +105,18 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         let length = parameter.value.as_slice().len();
         let octets = match reading {
             Reading::Octets(octets) => octets.clone(),
-            Reading::Number(_) | Reading::Text(_) if !parameter.data_type.is_integer() => {
+            _ if !parameter.data_type.is_integer() => {
                 let name = parameter.data_type.name().unwrap_or("of an unknown type");
-                return Err(Trouble::new(
-                    Kind::Usage,
-                    tried,
-                    format!("the parameter is {name}, which is no integer"),
-                    format!("give its {length} octets"),
-                ));
+                values::to_type(parameter.data_type, reading).ok_or_else(|| {
+                    Trouble::new(
+                        Kind::Usage,
+                        tried,
+                        format!("the parameter is {name}, and what is given is not"),
+                        format!("give a value of that type, or its {length} octets"),
+                    )
+                })?
             }
-            Reading::Number(_) | Reading::Text(_) => {
+            _ => {
                 let is_signed = parameter.data_type.is_signed();
                 let place = Place { values: &[], octets: length, is_signed };
                 place.octets(tried, place.number(tried, reading)?)?

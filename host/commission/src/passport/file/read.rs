@@ -15,7 +15,7 @@ use toml_edit::{Document, DocumentMut};
 use super::super::project::ExpectedPacketRates;
 use super::super::{FORMAT, Nameplate, Passport, Position, Project, Setting, Source};
 use super::FileError;
-use crate::Reading;
+use crate::{Reading, Real};
 
 pub(super) fn read(text: &str) -> Result<Passport, FileError> {
     let wrong = |error: &dyn fmt::Display| FileError { text: error.to_string() };
@@ -286,6 +286,10 @@ impl<'de> Deserialize<'de> for Entry {
             fn visit_u64<E: serde::de::Error>(self, number: u64) -> Result<Entry, E> {
                 let number = i64::try_from(number).map_err(|_| E::custom("a number too large"))?;
                 self.visit_i64(number)
+            }
+
+            fn visit_f64<E>(self, number: f64) -> Result<Entry, E> {
+                Ok(Entry(Reading::Real(Real::Double(number))))
             }
 
             fn visit_str<E>(self, text: &str) -> Result<Entry, E> {

@@ -108,6 +108,7 @@ fn settings(passport: &Passport) -> Table {
     for setting in &passport.settings {
         let value = match &setting.reading {
             Reading::Number(number) => Value::from(*number),
+            Reading::Real(real) => Value::from(real.number()),
             Reading::Text(text) => Value::from(text.as_str()),
             Reading::Octets(values) => octets(values),
         };
