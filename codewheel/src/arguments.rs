@@ -30,9 +30,6 @@ pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) verb: Option<Verb>,
 
-    #[command(flatten)]
-    pub(crate) page: PageArguments,
-
     /// Say nothing on stderr but errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
@@ -40,6 +37,9 @@ pub(crate) struct Arguments {
     /// Say more on stderr
     #[arg(short, long, global = true)]
     verbose: bool,
+
+    #[command(flatten)]
+    pub(crate) page: PageArguments,
 }
 
 /// How much goes to stderr.

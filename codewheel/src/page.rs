@@ -18,7 +18,7 @@ const TOKEN: &str = "CODEWHEEL_TOKEN";
 #[derive(Args, Debug, Default)]
 #[command(next_help_heading = "Web page")]
 pub(crate) struct PageArguments {
-    /// Where the page is served, such as 127.0.0.1:9000, [::1]:8080 or 0.0.0.0:8080; by default
+    /// Where the page is served, such as 127.0.0.1:9000 or 0.0.0.0:8080; by default
     /// 127.0.0.1:8080, or a free port where that one is taken
     #[arg(long, value_name = "ADDRESS:PORT", value_parser = parse_address)]
     listen: Option<SocketAddr>,

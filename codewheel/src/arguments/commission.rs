@@ -305,8 +305,8 @@ pub(crate) struct DiffArguments {
 
 /// Make an encoder what a passport says: the same one after a mishap, or the one that replaces it.
 ///
-/// The plan is shown before anything is written, each step is read back, and what was is written to
-/// a file first where --undo names one.
+/// The plan is shown before anything is written, each step is read back, and what the encoder was
+/// before is written to a new file first: beside FILE, as NAME.before.toml, or where --undo says.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:

@@ -160,8 +160,9 @@ fn with_range(trouble: Trouble, encoder: &mut Encoder, old: &Value, wanted: &Rea
     if total <= most {
         return trouble;
     }
+    let turns = if turns == 1 { "1 turn".to_owned() } else { format!("{turns} turns") };
     let remedy = format!(
-        "{steps} steps in {turns} turns are less than the total resolution of {total}: send another \
+        "{steps} steps in {turns} are less than the total resolution of {total}: send another \
          one with it, as in --parameter total-resolution={most}"
     );
     Trouble { remedy, ..trouble }

@@ -17,6 +17,9 @@
 //! of the Parameter object, and `05/1/9` for any attribute at all, as octets where nobody knows
 //! more. `poll-assembly` and `change-assembly` are the produced paths of ours.
 //!
+//! A parameter that its device scales is told with what it means in its unit; written is the number
+//! that lies on the bus, so that what is undone or carried over comes out even.
+//!
 //! # The order of writing
 //! One setting takes others with it (AMG manual §8):
 //!

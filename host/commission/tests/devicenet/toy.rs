@@ -308,10 +308,8 @@ impl Station for Toy {
         self.server.advance(now, &mut self.drive);
     }
     fn transmit(&mut self, now: Instant) -> Option<Frame> {
-        if self.late.front().is_some_and(|(at, _)| *at <= now)
-            && let Some((_, frame)) = self.late.pop_front()
-        {
-            return Some(frame);
+        if self.late.front().is_some_and(|(at, _)| *at <= now) {
+            return self.late.pop_front().map(|(_, frame)| frame);
         }
         let frame = self.server.transmit(now, &mut self.drive)?;
         let answers = frame.identifier() == Identifier::Standard(0x44B);

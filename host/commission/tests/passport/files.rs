@@ -1,9 +1,9 @@
 //! The file: what is written is read back, what people edit is taken, what cannot be is shown.
 
-use codewheel_commission::Reading;
 use codewheel_commission::passport::{
     ExpectedPacketRates, Nameplate, Passport, Position, Project, Setting, Source,
 };
+use codewheel_commission::{Reading, Real};
 use codewheel_device::Product;
 use codewheel_device::product::Bus;
 use proptest::collection::vec;
@@ -98,6 +98,15 @@ fn what_people_edit_is_taken_with_their_comments() {
     let again = Passport::parse(&passport.to_toml()).unwrap();
     assert_eq!(again, passport);
     assert!(again.to_toml().contains("steps-per-turn = 360 # gear 10:1"));
+}
+
+#[test]
+fn a_parameter_of_a_stranger_may_have_a_fraction() {
+    let text = drive().to_toml().replace("cos-delta = 1", "\"parameter/9\" = 0.1\ncos-delta = 1");
+    let passport = Passport::parse(&text).unwrap();
+    let setting = passport.settings.iter().find(|it| it.name == "parameter/9").unwrap();
+    assert_eq!(setting.reading, Reading::Real(Real::Single(0.1)));
+    assert!(passport.to_toml().contains("\"parameter/9\" = 0.1"), "{}", passport.to_toml());
 }
 
 /// What is said of the drive's file after an edit.

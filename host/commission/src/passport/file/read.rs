@@ -1,7 +1,6 @@
 //! From the text of a file to a passport.
 
 use std::fmt;
-use std::marker::PhantomData;
 use std::ops::Range;
 
 use codewheel_device::Product;
@@ -9,7 +8,9 @@ use codewheel_device::product::Bus;
 use codewheel_device::profibus::parameters;
 use jiff::Timestamp;
 use serde::Deserialize;
-use serde::de::{Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
+use serde::de::{
+    DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Unexpected, Visitor,
+};
 use toml_edit::{Document, DocumentMut};
 
 use super::super::project::ExpectedPacketRates;
@@ -256,7 +257,10 @@ impl<'de> Deserialize<'de> for Settings {
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Settings, A::Error> {
                 let mut settings = Vec::new();
-                while let Some((name, Entry(reading))) = map.next_entry::<String, Entry>()? {
+                while let Some(name) = map.next_key::<String>()? {
+                    // Our own settings are whole numbers; only strangers have others.
+                    let takes_fractions = name.starts_with("parameter/");
+                    let reading = map.next_value_seed(Entry { takes_fractions })?;
                     settings.push(Setting { name, reading, note: String::new() });
                 }
                 Ok(Settings(settings))
@@ -267,46 +271,55 @@ impl<'de> Deserialize<'de> for Settings {
 }
 
 /// The value of a setting: a number, a text, or octets.
-struct Entry(Reading);
+struct Entry {
+    takes_fractions: bool,
+}
 
-impl<'de> Deserialize<'de> for Entry {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct OfThree(PhantomData<()>);
-        impl<'de> Visitor<'de> for OfThree {
-            type Value = Entry;
+impl<'de> DeserializeSeed<'de> for Entry {
+    type Value = Reading;
 
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, a text or octets such as [0x20, 0x04]")
-            }
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Reading, D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
 
-            fn visit_i64<E>(self, number: i64) -> Result<Entry, E> {
-                Ok(Entry(Reading::Number(number)))
-            }
+impl<'de> Visitor<'de> for Entry {
+    type Value = Reading;
 
-            fn visit_u64<E: serde::de::Error>(self, number: u64) -> Result<Entry, E> {
-                let number = i64::try_from(number).map_err(|_| E::custom("a number too large"))?;
-                self.visit_i64(number)
-            }
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a text or octets such as [0x20, 0x04]")
+    }
 
-            fn visit_f64<E>(self, number: f64) -> Result<Entry, E> {
-                Ok(Entry(Reading::Real(Real::Double(number))))
-            }
+    fn visit_i64<E>(self, number: i64) -> Result<Reading, E> {
+        Ok(Reading::Number(number))
+    }
 
-            fn visit_str<E>(self, text: &str) -> Result<Entry, E> {
-                Ok(Entry(Reading::Text(text.to_owned())))
-            }
+    fn visit_u64<E: serde::de::Error>(self, number: u64) -> Result<Reading, E> {
+        let number = i64::try_from(number).map_err(|_| E::custom("a number too large"))?;
+        self.visit_i64(number)
+    }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Entry, A::Error> {
-                let mut octets = Vec::new();
-                while let Some(octet) = seq.next_element::<i64>()? {
-                    octets.push(u8::try_from(octet).map_err(|_| {
-                        A::Error::custom(format!("{octet} is no octet: it has 0 to 255"))
-                    })?);
-                }
-                Ok(Entry(Reading::Octets(octets)))
-            }
+    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Reading, E> {
+        if !self.takes_fractions {
+            return Err(E::invalid_type(Unexpected::Float(number), &self));
         }
-        deserializer.deserialize_any(OfThree(PhantomData))
+        Ok(Reading::Real(Real::Double(number)))
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Reading, E> {
+        Ok(Reading::Text(text.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Reading, A::Error> {
+        let mut octets = Vec::new();
+        while let Some(octet) = seq.next_element::<i64>()? {
+            octets.push(
+                u8::try_from(octet).map_err(|_| {
+                    A::Error::custom(format!("{octet} is no octet: it has 0 to 255"))
+                })?,
+            );
+        }
+        Ok(Reading::Octets(octets))
     }
 }
 
