@@ -112,7 +112,11 @@ pub(super) fn open_or_listen<'a>(
         return opened(Err(trouble), &stop);
     }
     // Whether a master exchanges data with it; any other trouble comes back when it is opened.
-    let is_another_s = Eavesdropper::open(&mut seat, address, &mut |_| {}).is_ok();
+    let is_another_s = match Eavesdropper::open(&mut seat, address, &mut |_| {}) {
+        Ok(_) => true,
+        Err(trouble) if stop.is_wanted() => return opened(Err(trouble), &stop),
+        Err(_) => false,
+    };
     if !is_another_s {
         let session = opened(Slave::open(seat, address, &settings, &mut |_| {}), &stop)?;
         return Ok(Way::Serve(Encoder::new(Box::new(session), at, bit_rate, chatter, stop)));

@@ -204,3 +204,26 @@ fn a_slave_that_another_master_takes_in_between_is_told_to_be_his() {
     seat.run(secs(6));
     is(&seat.open(5).unwrap_err(), Kind::Refused, "belongs to the master at MAC ID 1");
 }
+
+#[test]
+fn whoever_is_interrupted_leaves_no_slave_allocated() {
+    // What is sent to MAC ID 5: 4B allocates, 4C releases.
+    let count = |seat: &WireSeat, service: &str| {
+        let to_five = |frame: &&String| frame.starts_with("42E#") || frame.starts_with("42C#");
+        seat.ours().iter().filter(to_five).filter(|frame| frame.get(6..8) == Some(service)).count()
+    };
+    let scans = |seat: &mut WireSeat| {
+        scan(seat, ScanSettings::default(), &mut unheard).map(drop).unwrap_err()
+    };
+    let opens = |seat: &mut WireSeat| seat.open(5).map(drop).unwrap_err();
+    for attempt in [scans as fn(&mut WireSeat) -> Trouble, opens] {
+        for late in [0, 2, 5] {
+            let mut seat = with_encoder();
+            seat.interrupt_after_allocation(5, late);
+            let trouble = attempt(&mut seat);
+            assert_eq!(trouble.kind, Kind::Bus, "{trouble}");
+            assert_eq!(count(&seat, "4B"), 1);
+            assert_eq!(count(&seat, "4C"), 1, "{:#?}", seat.ours());
+        }
+    }
+}

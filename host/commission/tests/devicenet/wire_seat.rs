@@ -48,6 +48,10 @@ pub(crate) struct WireSeat {
     pub(crate) is_lost: bool,
     /// After how many turns somebody wants an end, which is said once.
     pub(crate) turns_left: Rc<Cell<Option<u32>>>,
+    /// Whether the next turn fails because a person wants an end.
+    is_interrupted: bool,
+    /// So many frames after this address was allocated it does.
+    interruption: Option<(u8, usize)>,
     /// Whether the memories of encoders take what they are given, and how long that lasts.
     pub(crate) has_memory: bool,
     pub(crate) memory_time: Duration,
@@ -65,6 +69,8 @@ impl WireSeat {
             frames: Vec::new(),
             is_lost: false,
             turns_left: Rc::default(),
+            is_interrupted: false,
+            interruption: None,
             has_memory: true,
             memory_time: Duration::ZERO,
             agenda: Vec::new(),
@@ -139,6 +145,25 @@ impl WireSeat {
         let at = self.wire.now() + span;
         let place = self.agenda.partition_point(|(other, _)| *other > at);
         self.agenda.insert(place, (at, Box::new(act)));
+    }
+
+    /// Has a person want an end so many frames after the encoder at `address` was allocated.
+    pub(crate) fn interrupt_after_allocation(&mut self, address: u8, frames: usize) {
+        self.interruption = Some((address, frames));
+    }
+
+    fn interrupt(&mut self) {
+        let Some((address, frames)) = self.interruption else { return };
+        let answers = format!("{:03X}#", 0x400 | u16::from(address) << 3 | 3);
+        let place = self.frames.iter().position(|(_, _, frame)| {
+            let frame = frame.to_string();
+            // CB: the response to Allocate.
+            frame.starts_with(&answers) && frame.get(6..8) == Some("CB")
+        });
+        if place.is_some_and(|place| self.frames.len() > place + frames) {
+            self.is_interrupted = true;
+            self.interruption = None;
+        }
     }
 
     /// Lets `span` pass.
@@ -247,6 +272,10 @@ impl Seat for WireSeat {
             return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
         }
         self.turns_left.set(self.turns_left.get().map(|turns| turns - 1));
+        self.interrupt();
+        if std::mem::take(&mut self.is_interrupted) {
+            return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
+        }
         self.step(until);
         Ok(Vec::new())
     }

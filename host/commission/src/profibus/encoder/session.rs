@@ -9,7 +9,7 @@ use crate::profibus::chosen::number_for;
 use crate::profibus::eavesdropper::{cycles, position, sample_of};
 use crate::profibus::identity::Told;
 use crate::profibus::values::{Known, for_the_project, raw_value, raw_values};
-use crate::profibus::{Acyclic, Console, Diagnosis, Event, SlaveState};
+use crate::profibus::{Console, Diagnosis, Event, SlaveState};
 use crate::{Identity, Kind, Name, Reading, Sample, Seat, Session, Trouble, Value};
 
 impl<S: Seat<Station = Console>> Encoder<S> {
@@ -267,10 +267,7 @@ impl<S: Seat<Station = Console>> Session for Encoder<S> {
         if let Standing::Served(served) = standing {
             // One that is gone needs no release.
             let _ = self.zero(served.configuration);
-            if let Some(master) = self.conversation.console().master_mut() {
-                master.stop();
-            }
-            self.conversation.ask(&tried, self.address, Acyclic::Unlock)?;
+            self.let_go(&tried)?;
         }
         self.take_events();
         self.conversation.leave()
