@@ -32,8 +32,8 @@ use self::service::Service;
 use crate::arguments::Chatter;
 use crate::arguments::commission::{
     ApplyArguments, BackupArguments, Consent, DiffArguments, EncoderAddress, GetArguments,
-    IdentifyArguments, PresetArguments, ScanArguments, ServiceArguments, SetArguments,
-    WatchArguments,
+    IdentifyArguments, PassportArguments, PresetArguments, ScanArguments, ServiceArguments,
+    SetArguments, WatchArguments,
 };
 use crate::failure::Failure;
 
@@ -111,7 +111,9 @@ pub(crate) fn apply(arguments: &ApplyArguments, chatter: Chatter) -> Result<Exit
     end(applied, arguments.format.json)
 }
 
-pub(crate) use self::passport::run as passport;
+pub(crate) fn passport(arguments: &PassportArguments) -> Result<ExitCode, Failure> {
+    end_with(passport::run(arguments), arguments.format.json)
+}
 
 fn serve(
     arguments: &ServiceArguments,

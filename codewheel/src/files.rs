@@ -2,20 +2,33 @@
 
 use std::fs;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 
-/// Puts `files`, each a name and its text, into `folder`, which is made where it is missing, and
-/// prints where each of them is.
-///
-/// A file that is there already and says the same is left alone; one that says something else is
-/// replaced only by `force`. Where one may not be replaced, none is written.
+/// Puts `files` into `folder`, as [`put`] does, and prints where each of them is.
 pub(crate) fn keep(
     folder: &Path,
     files: &[(impl AsRef<str>, impl AsRef<[u8]>)],
     force: bool,
 ) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    for path in put(folder, files, force)? {
+        writeln!(out, "{}", path.display())?;
+    }
+    Ok(())
+}
+
+/// Puts `files`, each a name and its text, into `folder`, which is made where it is missing, and says
+/// where each of them is.
+///
+/// A file that is there already and says the same is left alone; one that says something else is
+/// replaced only by `force`. Where one may not be replaced, none is written.
+pub(crate) fn put(
+    folder: &Path,
+    files: &[(impl AsRef<str>, impl AsRef<[u8]>)],
+    force: bool,
+) -> Result<Vec<PathBuf>, Failure> {
     let mut different = Vec::new();
     for (name, text) in files {
         let path = folder.join(name.as_ref());
@@ -38,11 +51,7 @@ pub(crate) fn keep(
     for (path, text) in different {
         write(folder, &path, text).map_err(|reason| failed(&path, reason))?;
     }
-    let mut out = io::stdout().lock();
-    for (name, _) in files {
-        writeln!(out, "{}", folder.join(name.as_ref()).display())?;
-    }
-    Ok(())
+    Ok(files.iter().map(|(name, _)| folder.join(name.as_ref())).collect())
 }
 
 /// Writes the file whole or not at all, whatever was there.

@@ -348,6 +348,7 @@ pub(crate) struct ApplyArguments {
 Examples:
   codewheel passport startup.pcapng
   codewheel passport startup.log -o passports
+  codewheel passport startup.log --json | jq '.passport.settings'
 
 What the recording does not show is not in the passport, which says so.")]
 pub(crate) struct PassportArguments {
@@ -358,6 +359,9 @@ pub(crate) struct PassportArguments {
 
     #[command(flatten)]
     pub(crate) output: super::OutputArguments,
+
+    #[command(flatten)]
+    pub(crate) format: Format,
 }
 
 fn rate(text: &str) -> Result<f64, String> {

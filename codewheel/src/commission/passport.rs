@@ -2,15 +2,24 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use codewheel_capture::{ReadError, Reader};
 use codewheel_commission::passport::{Passport, from_capture};
+use serde::Serialize;
 
 use super::passports::PROGRAM;
+use crate::arguments::OutputArguments;
 use crate::arguments::commission::PassportArguments;
 use crate::failure::Failure;
 use crate::files;
+
+#[derive(Serialize)]
+struct Line {
+    file: Option<PathBuf>,
+    passport: serde_json::Value,
+}
 
 /// Something in the recording is damaged. What is whole has been used all the same.
 const DAMAGED: u8 = 1;
@@ -31,6 +40,11 @@ pub(crate) fn run(arguments: &PassportArguments) -> Result<ExitCode, Failure> {
         }
     })?;
     let files = named(&passports);
+    let end = if damages == 0 { ExitCode::SUCCESS } else { ExitCode::from(DAMAGED) };
+    if arguments.format.json {
+        tell(&files, arguments)?;
+        return Ok(end);
+    }
     match (&arguments.output.folder, files.as_slice()) {
         (Some(folder), files) => files::keep(folder, files, arguments.output.force)?,
         (None, [(_, text)]) => std::io::stdout().lock().write_all(text.as_bytes())?,
@@ -44,7 +58,25 @@ pub(crate) fn run(arguments: &PassportArguments) -> Result<ExitCode, Failure> {
             )));
         }
     }
-    Ok(if damages == 0 { ExitCode::SUCCESS } else { ExitCode::from(DAMAGED) })
+    Ok(end)
+}
+
+/// One object a line for each encoder: its passport, and the file where one was written.
+fn tell(files: &[(String, String)], arguments: &PassportArguments) -> Result<(), Failure> {
+    let OutputArguments { folder, force } = &arguments.output;
+    let paths = match folder {
+        Some(folder) => files::put(folder, files, *force)?,
+        None => Vec::new(),
+    };
+    let mut paths = paths.into_iter();
+    let mut out = std::io::stdout().lock();
+    for (_, text) in files {
+        // It is read back as any other program reads it.
+        let passport = toml::from_str(text).map_err(std::io::Error::other)?;
+        let line = Line { file: paths.next(), passport };
+        writeln!(out, "{}", serde_json::to_string(&line).map_err(std::io::Error::from)?)?;
+    }
+    Ok(())
 }
 
 /// Each with the name of its file, such as `devicenet-5.toml`; an address on a second bus of the

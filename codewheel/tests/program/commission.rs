@@ -307,6 +307,10 @@ fn a_dead_encoder_leaves_its_passport_in_a_recording_of_its_bus() {
 
     let text = printed(&["passport", &capture]);
     assert!(text.contains("steps-per-turn = 3600") && text.contains("serial = 77"), "{text}");
+    let told: serde_json::Value =
+        serde_json::from_str(&printed(&["passport", &capture, "--json"])).expect("one object");
+    assert_eq!(told["file"], serde_json::Value::Null);
+    assert_eq!(told["passport"]["settings"]["steps-per-turn"], 3600);
     let passports = file("passports");
     let listed = printed(&["passport", &capture, "-o", &passports]);
     assert!(listed.ends_with("devicenet-5.toml\n"), "{listed}");

@@ -119,12 +119,15 @@ fn disc(goal: &Passport, before: &Passport, session: &dyn Session) -> Result<(),
     let most = steps.saturating_mul(turns.into());
     if total > most {
         let needed = total.checked_div(steps).unwrap_or_default();
-        let kind = if turns == 1 { "a singleturn encoder" } else { "an encoder" };
+        let kind = match turns {
+            1 => "a singleturn encoder has".to_owned(),
+            _ => format!("an encoder with {turns} turns has"),
+        };
         return Err(refused(
             session,
             format!(
-                "the passport measures {total} steps, and {kind} with {turns} turns only {most} at \
-                 {steps} steps per turn"
+                "the passport measures {total} steps, and {kind} only {most} at {steps} steps \
+                 per turn"
             ),
             format!("take a multiturn encoder that tells at least {needed} turns apart"),
         ));
