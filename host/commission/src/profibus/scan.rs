@@ -46,8 +46,8 @@ impl Default for ScanSettings {
 /// what it is; listen longer before, where there may be such.
 ///
 /// # Errors
-/// [`Trouble`]: the bus is lost, the own address is taken, no token goes round that could be shared, or
-/// the ring does not admit another master.
+/// [`Trouble`]: the bus is lost, nobody is there, the own address is taken, no token goes round that
+/// could be shared, or the ring does not admit another master.
 pub fn scan(
     seat: &mut impl Seat<Station = Console>,
     settings: ScanSettings,
@@ -86,9 +86,10 @@ pub fn scan(
         asked = ask_all(&mut conversation, progress)?;
         let console = conversation.console();
         if asked.is_empty() && console.overheard().octets() == 0 {
-            remarks.push(format!(
-                "nobody answers at {rate}: look at supply, wiring, termination and rate"
-            ));
+            let came =
+                format!("nobody was heard at {rate}, and none of the 125 other addresses answered");
+            let remedy = "look at supply, wiring, termination and rate";
+            return Err(Trouble::new(Kind::Bus, "scan the bus", came, remedy));
         }
     }
     remarks.append(&mut conversation.take_notices());

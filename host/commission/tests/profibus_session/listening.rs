@@ -136,12 +136,10 @@ fn a_bus_at_another_rate_is_called_so_and_not_spoken_to() {
 
 #[test]
 fn on_a_silent_bus_it_is_said_what_to_look_at() {
-    let survey = Bench::new().scan(quick(RATE)).unwrap();
-    assert!(survey.nodes.is_empty());
-    assert_eq!(
-        survey.remarks,
-        ["nobody answers at 1.5M: look at supply, wiring, termination and rate"]
-    );
+    let trouble = Bench::new().scan(quick(RATE)).unwrap_err();
+    assert_eq!(trouble.kind, Kind::Bus);
+    assert!(trouble.came.contains("1.5M"), "{trouble}");
+    assert!(trouble.remedy.contains("supply, wiring, termination and rate"), "{trouble}");
 }
 
 proptest! {
