@@ -113,7 +113,7 @@ impl<S: Seat<Station = Console>> Encoder<S> {
         if opened.is_err() {
             // What went wrong before is the one to hear of.
             let _ = session.let_go(&tried);
-            let _ = session.conversation.leave();
+            session.conversation.abandon();
         }
         opened.map(|()| session)
     }

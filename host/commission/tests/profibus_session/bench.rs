@@ -55,13 +55,14 @@ pub(crate) struct Bench {
     pub(crate) said: u64,
     /// What the console sent as outputs to whom, each once in a row.
     pub(crate) outputs: Vec<Vec<u8>>,
-    /// How many telegrams of the console a person lets pass before they want an end.
-    pub(crate) patience: Option<u64>,
     /// Who is unplugged, and when.
     unplugs: Option<(Instant, u8)>,
     /// When a person wants an end.
-    interrupts: Option<fn(&Self) -> bool>,
+    interrupts: Option<Wish>,
 }
+
+/// Whether a person wants an end by now.
+type Wish = Box<dyn Fn(&Bench) -> bool>;
 
 impl std::fmt::Debug for Bench {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -105,7 +106,6 @@ impl Bench {
             complaints: Vec::new(),
             said: 0,
             outputs: Vec::new(),
-            patience: None,
             unplugs: None,
             interrupts: None,
         }
@@ -276,9 +276,9 @@ impl Bench {
         self.wire.detach(id);
     }
 
-    /// Lets turns fail as soon as something is so, until what was begun is wound up.
-    pub(crate) fn interrupt_when(&mut self, is_so: fn(&Self) -> bool) {
-        self.interrupts = Some(is_so);
+    /// Lets one turn fail as soon as something is so.
+    pub(crate) fn interrupt_when(&mut self, is_so: impl Fn(&Self) -> bool + 'static) {
+        self.interrupts = Some(Box::new(is_so));
     }
 
     pub(crate) fn scan(&mut self, settings: ScanSettings) -> Result<Survey, Trouble> {
@@ -307,11 +307,8 @@ impl Seat for Bench {
     }
 
     fn turn(&mut self, until: Instant) -> Result<Vec<Notice>, LinkError> {
-        let is_wanted = self.interrupts.is_some_and(|is_so| is_so(self));
-        if is_wanted {
+        if self.interrupts.as_ref().is_some_and(|is_so| is_so(self)) {
             self.interrupts = None;
-        }
-        if is_wanted || self.patience.take_if(|patience| *patience < self.said).is_some() {
             return Err(LinkError::System(std::io::ErrorKind::Interrupted.into()));
         }
         self.step(until);

@@ -113,7 +113,7 @@ fn whoever_is_interrupted_while_opening_lets_the_slave_go_and_falls_silent() {
     let mut interrupted = 0;
     for telegrams in 0.. {
         let mut bench = Bench::new().with(7, "amg11-p29");
-        bench.patience = Some(telegrams);
+        bench.interrupt_when(move |bench| bench.said > telegrams);
         let Err(trouble) = bench.open(7, &alone()).map(drop) else { break };
         assert_eq!(trouble.kind, Kind::Bus, "{trouble}");
         interrupted += 1;
@@ -131,7 +131,7 @@ fn whoever_is_interrupted_while_opening_lets_the_slave_go_and_falls_silent() {
 #[test]
 fn whoever_is_interrupted_while_scanning_falls_silent() {
     let mut bench = Bench::new().with(7, "amg11-p29");
-    bench.patience = Some(40);
+    bench.interrupt_when(|bench| bench.said > 40);
     bench.scan(quick(RATE)).unwrap_err();
     let said = bench.said;
     bench.run(Duration::from_secs(1));
